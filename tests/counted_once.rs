@@ -35,7 +35,8 @@ fn rewritten(source: &Path, part: Range<f64>, path: &Path, compression: Option<C
         let schema = channel.schema.as_ref().expect("a schema");
         let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data).expect("a schema");
         let encoding = &channel.message_encoding;
-        ids.insert(topic, writer.add_channel(schema, topic, encoding, &channel.metadata).expect("a channel"));
+        let metadata = channel.metadata.iter().cloned().collect();
+        ids.insert(topic, writer.add_channel(schema, topic, encoding, &metadata).expect("a channel"));
     }
     for (topic, sequence, log_time, publish_time, data) in &messages {
         let (log_time, publish_time) = (*log_time, *publish_time);

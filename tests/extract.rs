@@ -55,10 +55,10 @@ fn thicken(fixture: &str, path: &Path) {
     let (mut count, image) = (0_u64, vec![7; 5000]);
     open(&root().join("fixtures/paper").join(fixture))
         .for_each_raw(&mut |m| {
-            let schema =
-                m.channel.schema.as_ref().map(|s| (s.name.as_str(), s.encoding.as_str(), &s.data[..]));
-            let (encoding, metadata) = (&m.channel.message_encoding, &m.channel.metadata);
-            let id = out.add_channel(&m.channel.topic, schema, encoding, metadata)?;
+            let schema = m.channel.schema.as_ref().map(|s| (&*s.name, &*s.encoding, &s.data[..]));
+            let encoding = &m.channel.message_encoding;
+            let metadata = m.channel.metadata.iter().cloned().collect();
+            let id = out.add_channel(&m.channel.topic, schema, encoding, &metadata)?;
             count += 1;
             if count % 50 == 0 {
                 out.put(camera, 1, m.log_ns, m.publish_ns, &image)?;

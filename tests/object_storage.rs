@@ -107,7 +107,8 @@ fn with_camera() -> Vec<u8> {
             let schema = m.channel.schema.as_ref().expect("a schema");
             let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data).expect("a schema");
             let (topic, encoding) = (&m.channel.topic, &m.channel.message_encoding);
-            let id = writer.add_channel(schema, topic, encoding, &m.channel.metadata).expect("a channel");
+            let metadata = m.channel.metadata.iter().cloned().collect();
+            let id = writer.add_channel(schema, topic, encoding, &metadata).expect("a channel");
             writer.write_to_known_channel(&header(id), m.data).expect("written");
             Ok(())
         })

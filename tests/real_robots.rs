@@ -1,4 +1,6 @@
 use crate::support::{number, real_recordings, root, run_as_shipped, run_pipeline, shipped};
+use armcal_core::Severity;
+use armcal_recording::{Recording, is_recording};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -189,5 +191,31 @@ fn the_curves_that_are_proposed_for_the_ur10_predict_poses_they_never_saw() {
         let [_, fitted] = held_out_mm(&run_pipeline(&own, out.path(), &[0, 3]));
         println!("{name} with five curves and compliance: held out {fitted:.3} mm");
         assert!(fitted <= 0.100, "{name}: {fitted} mm");
+    }
+}
+
+/// What says what was written agrees with what is read, in every recording there is of which nothing was lost.
+#[test]
+fn no_sound_recording_is_reported_as_damaged() {
+    let Some(real) = real_recordings() else { return };
+    let mut folders = vec![real, root().join("fixtures")];
+    let mut recordings = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if is_recording(&path) {
+                recordings.push(path);
+            }
+        }
+    }
+    assert!(recordings.len() >= 20, "{recordings:?}");
+    for path in recordings {
+        let recording = Recording::open(std::slice::from_ref(&path)).expect("a recording");
+        let report = recording.report();
+        let lost: Vec<_> = report.warnings.iter().filter(|w| w.severity >= Severity::DataLost).collect();
+        assert_eq!(lost, Vec::<&armcal_core::Warning>::new(), "{}", path.display());
+        assert!(report.channels.iter().any(|channel| channel.messages > 0), "{}", path.display());
     }
 }

@@ -22,6 +22,45 @@ pub fn print(text: &str) -> Result<(), Error> {
     written(|out| out.write_all(harmless(text, style()).as_bytes()))
 }
 
+/// Prints a value as JSON, without holding the text of all of it.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_json(value: &impl serde::Serialize) -> Result<(), Error> {
+    written(|out| {
+        let mut lines = Lines { out, pending: Vec::new() };
+        serde_json::to_writer_pretty(&mut lines, value)?;
+        lines.pending.push(b'\n');
+        lines.flush()
+    })
+}
+
+/// Printed some lines at a time: a character is never cut in two.
+struct Lines<'a> {
+    out: &'a mut dyn io::Write,
+    pending: Vec<u8>,
+}
+
+/// Lines are printed once there are so many bytes of them.
+const LINES_BYTES: usize = 64 << 10;
+
+impl io::Write for Lines<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.pending.extend_from_slice(bytes);
+        if self.pending.len() >= LINES_BYTES && bytes.ends_with(b"\n") {
+            self.flush()?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let text = String::from_utf8_lossy(&self.pending);
+        self.out.write_all(harmless(&text, style()).as_bytes())?;
+        self.pending.clear();
+        Ok(())
+    }
+}
+
 /// Writes to stdout by other means than [`print`], such as the help of the command line.
 ///
 /// # Errors

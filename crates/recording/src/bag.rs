@@ -61,16 +61,17 @@ pub(crate) fn compare(files: &[RecordingFile], surveys: &[FileSurvey]) -> Vec<(u
     said
 }
 
-/// Files beside a recording that are read with it: logs of a database, and the description of its bag.
-pub fn read_with(path: &Path) -> Vec<PathBuf> {
+/// Files beside a recording that are read with it: the logs of a database, which are part of its identity, and the description
+/// of its bag.
+pub fn read_with(path: &Path) -> (Vec<PathBuf>, Option<PathBuf>) {
     if is_url(path) {
-        return Vec::new();
+        return (Vec::new(), None);
     }
     let logs = logs_of(path).into_iter().map(|(_, path)| path);
     let description = path.parent().unwrap_or(Path::new("")).join(FILE);
     let holds =
         |path: &PathBuf| std::fs::metadata(path).is_ok_and(|about| about.is_file() && about.len() > 0);
-    logs.chain(Some(description).filter(holds)).collect()
+    (logs.collect(), Some(description).filter(holds))
 }
 
 /// The text, where there is a file of that name.
@@ -95,8 +96,9 @@ fn messages(file: &RecordingFile, survey: &FileSurvey) -> Option<BTreeMap<String
         return None;
     }
     let mut topics = BTreeMap::new();
-    for (id, channel) in &file.channels {
-        *topics.entry(channel.topic.clone()).or_default() += survey.tallies.get(id).map_or(0, |t| t.messages);
+    for (id, channel) in file.channels() {
+        *topics.entry(channel.topic.clone()).or_default() +=
+            survey.tallies.get(&id).map_or(0, |t| t.messages);
     }
     Some(topics)
 }

@@ -13,14 +13,18 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 pub(crate) const TIMES: u64 = 100;
 /// What a recording may inflate to beyond that [bytes].
 const FREE_BYTES: u64 = 8 << 20;
+/// All passes of a command over a recording may inflate so many times what one may: the longest, `armcal init` of many bodies
+/// that cannot be read, make some more, and of a sound recording each takes a tenth of what it may.
+const PASSES: u64 = 10;
 /// The environment variable that says another number [MiB].
 pub(crate) const FREE_VARIABLE: &str = "ARMCAL_INFLATE_MIB";
 
-/// What the bytes of one file, or of all files of a recording in one pass, may still inflate to.
+/// What the bytes of one file, of all files of a recording in one pass, or in all passes, may still inflate to.
 #[derive(Debug)]
 pub struct Allowance {
     bytes: u64,
     free: u64,
+    passes: u64,
     left: AtomicU64,
     exceeded: AtomicBool,
 }
@@ -30,8 +34,25 @@ impl Allowance {
     pub(crate) fn of(bytes: u64, files: usize) -> Allowance {
         let stated = std::env::var(FREE_VARIABLE).ok().and_then(|mib| mib.trim().parse::<u64>().ok());
         let free = stated.map_or(FREE_BYTES, |mib| mib.saturating_mul(1 << 20)) / files.max(1) as u64;
-        let left = AtomicU64::new(free.saturating_add(bytes.saturating_mul(TIMES)));
-        Allowance { bytes, free, left, exceeded: AtomicBool::new(false) }
+        Allowance { bytes, free, passes: 1, left: AtomicU64::new(0), exceeded: AtomicBool::new(false) }.full()
+    }
+
+    /// Of all passes over a recording of so many bytes.
+    pub(crate) fn of_passes(bytes: u64) -> Allowance {
+        Allowance { passes: PASSES, ..Allowance::of(bytes, 1) }.full()
+    }
+
+    fn full(self) -> Allowance {
+        Allowance { left: AtomicU64::new(self.limit()), ..self }
+    }
+
+    fn limit(&self) -> u64 {
+        self.free.saturating_add(self.bytes.saturating_mul(TIMES)).saturating_mul(self.passes)
+    }
+
+    /// What has been taken [bytes].
+    pub(crate) fn taken(&self) -> u64 {
+        self.limit() - self.left.load(Ordering::Relaxed)
     }
 
     /// Takes what a chunk of `packed` bytes claims to inflate to. One that alone claims too much takes nothing: its claim may
@@ -63,8 +84,10 @@ impl Allowance {
 
     /// The limit in words.
     pub(crate) fn refusal(&self) -> String {
-        let limit = self.free.saturating_add(self.bytes.saturating_mul(TIMES));
-        format!("it inflates to more than the {limit} bytes that it may (docs/hardening.md, {FREE_VARIABLE})")
+        let (limit, how) = (self.limit(), if self.passes > 1 { ", read again and again," } else { "" });
+        format!(
+            "it{how} inflates to more than the {limit} bytes that it may (docs/hardening.md, {FREE_VARIABLE})"
+        )
     }
 }
 

@@ -1,5 +1,6 @@
 //! Channel and schema definitions of one file.
 
+use crate::foreign::DEFINITION_FROM;
 use crate::raw::{RawChannel, RawSchema};
 use crate::records::{Cursor, RawRecord};
 use mcap::records::op;
@@ -7,11 +8,26 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
+/// What the texts of all definitions of a file may take in memory [bytes]: recorders write some megabytes at most.
+pub(crate) const MOST_BYTES: usize = 32 << 20;
+/// What an entry of the metadata of a channel takes besides its text [bytes].
+const ENTRY_BYTES: usize = 112;
+/// Longer metadata of a channel is none [bytes].
+const MOST_METADATA_BYTES: usize = 1 << 20;
+
+/// Why a definition is not kept.
+const TOO_MANY: &str =
+    "its schemas and channels take more than the 32 MiB that they may; this one is not used";
+/// Why two definitions cannot both be right.
+const OTHER: &str = "another definition of the same number than the one before";
+
 /// Schemas and channels by id. The first definition of an id wins; MCAP forbids a second that differs.
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Definitions {
     schemas: BTreeMap<u16, Arc<RawSchema>>,
     channels: BTreeMap<u16, Channel>,
+    /// What their texts take [bytes].
+    bytes: usize,
 }
 
 /// A channel that names its schema by id; 0 for none. What it is called is shared with whoever resolves it.
@@ -24,10 +40,14 @@ struct Channel {
 impl PartialEq for Channel {
     fn eq(&self, other: &Channel) -> bool {
         let (own, others) = (&self.raw, &other.raw);
+        // Where a definition is from is noted here, and not in the record that this may be compared with.
+        let metadata = |channel: &RawChannel| {
+            channel.metadata.iter().filter(|(key, _)| key != DEFINITION_FROM).cloned().collect::<Vec<_>>()
+        };
         self.schema_id == other.schema_id
             && own.topic == others.topic
             && own.message_encoding == others.message_encoding
-            && own.metadata == others.metadata
+            && metadata(own) == metadata(others)
     }
 }
 
@@ -40,13 +60,27 @@ impl Definitions {
         self.check(record)?;
         match record.op {
             op::SCHEMA => {
-                if let Some((id, schema)) = SchemaRecord::parse(record.body) {
-                    self.schemas.entry(id).or_insert_with(|| Arc::new(schema.owned()));
+                if let Some((id, schema)) = SchemaRecord::parse(record.body)
+                    && !self.schemas.contains_key(&id)
+                {
+                    self.bytes = room(self.bytes, record.body.len())?;
+                    let before = self.schemas.last_key_value().map(|(_, schema)| &schema.encoding);
+                    self.schemas.insert(id, Arc::new(schema.owned(before)));
                 }
             }
             op::CHANNEL => {
-                if let Some((id, channel)) = channel(record.body) {
-                    self.channels.entry(id).or_insert(channel);
+                if let Some((id, mut channel)) = channel(record.body)
+                    && !self.channels.contains_key(&id)
+                {
+                    self.bytes = room(self.bytes, channel.bytes())?;
+                    // Most channels are encoded alike, and say so in one text.
+                    if let Some((_, before)) = self.channels.last_key_value()
+                        && before.raw.message_encoding == channel.raw.message_encoding
+                    {
+                        Arc::make_mut(&mut channel.raw).message_encoding =
+                            before.raw.message_encoding.clone();
+                    }
+                    self.channels.insert(id, channel);
                 }
             }
             _ => {}
@@ -70,45 +104,98 @@ impl Definitions {
             }
             _ => true,
         };
-        if agrees { Ok(()) } else { Err("another definition of the same number than the one before") }
+        if agrees { Ok(()) } else { Err(OTHER) }
     }
 
-    /// Adds what `other` has and `self` has not; says whether what both have is the same.
-    pub fn merge(&mut self, other: Definitions) -> bool {
-        let mut same = true;
+    /// None, with as much room left as there is beside these.
+    pub fn beside(&self) -> Definitions {
+        Definitions { bytes: self.bytes, ..Definitions::default() }
+    }
+
+    /// Whether there is a definition of its kind and number.
+    pub fn has(&self, record: &RawRecord<'_>) -> bool {
+        let number = Cursor::new(record.body).u16();
+        number.is_some_and(|id| match record.op {
+            op::SCHEMA => self.schemas.contains_key(&id),
+            _ => self.channels.contains_key(&id),
+        })
+    }
+
+    /// Adds what `other` has and `self` has not.
+    ///
+    /// # Errors
+    /// Why not all of it could be, or what both have is not the same.
+    pub fn merge(&mut self, other: Definitions) -> Result<(), &'static str> {
+        let mut said = Ok(());
         for (id, schema) in other.schemas {
-            same &= *self.schemas.entry(id).or_insert_with(|| schema.clone()) == schema;
+            said = said.and(match self.schemas.entry(id) {
+                Entry::Occupied(known) if *known.get() != schema => Err(OTHER),
+                Entry::Occupied(_) => Ok(()),
+                Entry::Vacant(free) => room(self.bytes, schema.bytes()).map(|bytes| {
+                    self.bytes = bytes;
+                    free.insert(schema);
+                }),
+            });
         }
         for (id, channel) in other.channels {
-            match self.channels.entry(id) {
-                Entry::Occupied(known) => same &= *known.get() == channel,
-                Entry::Vacant(free) => _ = free.insert(channel),
+            said = said.and(match self.channels.entry(id) {
+                Entry::Occupied(known) if *known.get() != channel => Err(OTHER),
+                Entry::Occupied(_) => Ok(()),
+                Entry::Vacant(free) => room(self.bytes, channel.bytes()).map(|bytes| {
+                    self.bytes = bytes;
+                    free.insert(channel);
+                }),
+            });
+        }
+        said
+    }
+
+    /// The channel of this id.
+    pub fn channel(&self, id: u16) -> Option<&Arc<RawChannel>> {
+        self.channels.get(&id).map(|channel| &channel.raw)
+    }
+
+    /// Every channel, by id.
+    pub fn channels(&self) -> impl Iterator<Item = (u16, &Arc<RawChannel>)> {
+        self.channels.iter().map(|(id, channel)| (*id, &channel.raw))
+    }
+
+    /// Gives every channel its schema, once all are known.
+    pub fn resolve(&mut self) {
+        for channel in self.channels.values_mut() {
+            let schema = self.schemas.get(&channel.schema_id);
+            if channel.raw.schema.as_ref() != schema {
+                Arc::make_mut(&mut channel.raw).schema = schema.cloned();
             }
         }
-        same
     }
 
-    /// Whether a channel has this id.
-    pub fn contains(&self, id: u16) -> bool {
-        self.channels.contains_key(&id)
-    }
-
-    /// Every channel with its schema, by id.
-    pub fn resolve(&self) -> BTreeMap<u16, Arc<RawChannel>> {
-        self.clone().shared()
-    }
-
-    /// The same, where they are kept: nothing is there twice.
-    pub fn shared(&mut self) -> BTreeMap<u16, Arc<RawChannel>> {
-        let schemas = &self.schemas;
-        let with_schema = |(id, channel): (&u16, &mut Channel)| {
-            let schema = schemas.get(&channel.schema_id).cloned();
-            if channel.raw.schema != schema {
-                Arc::make_mut(&mut channel.raw).schema = schema;
+    /// Adds an entry to the metadata of resolved channels.
+    pub fn annotate(&mut self, entry: impl Fn(&RawChannel) -> Option<(String, String)>) {
+        for channel in self.channels.values_mut() {
+            if let Some(entry) = entry(&channel.raw) {
+                Arc::make_mut(&mut channel.raw).metadata.push(entry);
             }
-            (*id, channel.raw.clone())
-        };
-        self.channels.iter_mut().map(with_schema).collect()
+        }
+    }
+}
+
+/// What is taken with so many bytes more.
+fn room(taken: usize, more: usize) -> Result<usize, &'static str> {
+    Some(taken + more).filter(|bytes| *bytes <= MOST_BYTES).ok_or(TOO_MANY)
+}
+
+impl RawSchema {
+    fn bytes(&self) -> usize {
+        self.name.len() + self.encoding.len() + self.data.len()
+    }
+}
+
+impl Channel {
+    fn bytes(&self) -> usize {
+        let RawChannel { topic, message_encoding, metadata, .. } = &*self.raw;
+        let entries = metadata.iter().map(|(key, value)| key.len() + value.len() + ENTRY_BYTES);
+        topic.len() + message_encoding.len() + entries.sum::<usize>()
     }
 }
 
@@ -128,22 +215,25 @@ impl<'a> SchemaRecord<'a> {
     }
 
     fn is(&self, known: &RawSchema) -> bool {
-        self.name == known.name && self.encoding == known.encoding && self.data == known.data
+        *self.name == *known.name && *self.encoding == *known.encoding && self.data == known.data
     }
 
-    fn owned(&self) -> RawSchema {
-        let (name, encoding) = (self.name.to_owned(), self.encoding.to_owned());
-        RawSchema { name, encoding, data: self.data.to_vec() }
+    /// The same to keep; `before` is the encoding of another one, which most have in common.
+    fn owned(&self, before: Option<&Arc<str>>) -> RawSchema {
+        let shared = before.filter(|before| ***before == *self.encoding).cloned();
+        let encoding = shared.unwrap_or_else(|| self.encoding.into());
+        RawSchema { name: self.name.into(), encoding, data: self.data.to_vec() }
     }
 }
 
 fn channel(body: &[u8]) -> Option<(u16, Channel)> {
     let mut fields = Cursor::new(body);
     let (id, schema_id) = (fields.u16()?, fields.u16()?);
-    let (topic, message_encoding) = (fields.string()?, fields.string()?);
-    let metadata = fields.map(Cursor::string, Cursor::string)?;
-    Some((
-        id,
-        Channel { schema_id, raw: Arc::new(RawChannel { topic, schema: None, message_encoding, metadata }) },
-    ))
+    let (topic, message_encoding) = (fields.string()?, fields.text()?.into());
+    if fields.rest().len() > 4 + MOST_METADATA_BYTES {
+        return None;
+    }
+    let metadata = fields.map(Cursor::string, Cursor::string)?.into_iter().collect();
+    let raw = RawChannel { topic, schema: None, message_encoding, metadata };
+    Some((id, Channel { schema_id, raw: Arc::new(raw) }))
 }

@@ -56,9 +56,7 @@ pub fn extract(recording: &Recording, wanted: &Extract<'_>, out: &Path) -> Resul
             output.attach(a.name, a.media_type, a.log_ns, a.create_ns, a.data)
         })?;
     }
-    for (name, entries) in recording.metadata()? {
-        output.metadata(&name, &entries)?;
-    }
+    recording.for_each_metadata(&mut |name, entries| output.metadata(name, entries))?;
     output.metadata(EXTRACT_METADATA, &about(recording, &kept)?)?;
     output.finish()?;
     Ok(Extracted { topics: kept.topics, attachments })
@@ -97,9 +95,9 @@ impl Kept {
         channel: &RawChannel,
         output: &mut McapOutput,
     ) -> Result<(u16, usize), RecordingError> {
-        let schema =
-            channel.schema.as_ref().map(|s| (s.name.as_str(), s.encoding.as_str(), s.data.as_slice()));
-        let id = output.add_channel(&channel.topic, schema, &channel.message_encoding, &channel.metadata)?;
+        let schema = channel.schema.as_ref().map(|s| (&*s.name, &*s.encoding, s.data.as_slice()));
+        let metadata = channel.metadata.iter().cloned().collect();
+        let id = output.add_channel(&channel.topic, schema, &channel.message_encoding, &metadata)?;
         let place = *self.places.entry(channel.topic.clone()).or_insert_with(|| {
             self.topics.push((channel.topic.clone(), 0));
             self.topics.len() - 1

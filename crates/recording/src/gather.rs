@@ -109,8 +109,8 @@ impl Gathered {
 
 /// Whether a topic is there that can be read like this.
 pub(crate) fn can_read(recording: &Recording, request: &Request<'_>) -> bool {
-    let mut channels = recording.files.iter().flat_map(|f| f.channels.values());
-    channels.any(|c| c.topic == request.topic && compile(c, request).is_ok())
+    let mut channels = recording.files.iter().flat_map(RecordingFile::channels);
+    channels.any(|(_, c)| c.topic == request.topic && compile(c, request).is_ok())
 }
 
 /// One column of its parts in order, copied once if there are several.
@@ -148,7 +148,7 @@ pub(crate) fn gather(
     let allowance = recording.allowance();
     let rows: Vec<f64> = (0..requests.len()).map(|request| declared(recording, &wanted, request)).collect();
     let (surveys, stretches) = sweep(
-        &recording.files,
+        recording,
         &blocks(&recording.files, &channels),
         |share| {
             requests.iter().zip(&rows).map(|(r, rows)| Stretch::new(r.kind, share * rows)).collect::<Vec<_>>()
@@ -192,12 +192,12 @@ fn target(
     let mut unreadable = BTreeSet::new();
     let mut readable = 0;
     for (file, wanted) in recording.files.iter().zip(wanted) {
-        for (id, channel) in file.channels.iter().filter(|(_, c)| c.topic == request.topic) {
+        for (id, channel) in file.channels().filter(|(_, c)| c.topic == request.topic) {
             match compile(channel, request) {
                 Ok((plan, to_m)) => {
                     readable += 1;
-                    let cdr = channel.message_encoding == "cdr";
-                    wanted.entry(*id).or_default().push(Target { request: index, plan, to_m, cdr });
+                    let cdr = *channel.message_encoding == *"cdr";
+                    wanted.entry(id).or_default().push(Target { request: index, plan, to_m, cdr });
                 }
                 Err(why) => {
                     unreadable.insert(why);
@@ -210,8 +210,8 @@ fn target(
     }
     let (role, topic) = (request.role, request.topic.to_owned());
     if unreadable.is_empty() {
-        let channels = recording.files.iter().flat_map(|f| f.channels.values());
-        let present: BTreeSet<String> = channels.map(|c| c.topic.clone()).collect();
+        let channels = recording.files.iter().flat_map(RecordingFile::channels);
+        let present: BTreeSet<String> = channels.map(|(_, c)| c.topic.clone()).collect();
         let nearest = nearest(&topic, &present);
         return Err(RecordingError::TopicMissing {
             role,
@@ -242,7 +242,8 @@ fn compile(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f6
     };
     let plan = plan.map_err(|e| e.to_string())?;
     let plan = if let Kind::Transforms { .. } = kind { plan.every_body() } else { plan };
-    let plan = if channel.metadata.contains_key(DEFINITION_FROM) { plan.exact() } else { plan };
+    let plan =
+        if channel.metadata.iter().any(|(key, _)| key == DEFINITION_FROM) { plan.exact() } else { plan };
     // Types that are millimetres by definition are so whatever the configuration says.
     let to_m = match kind {
         Kind::Pose { .. } | Kind::Transforms { .. } if plan.in_millimetres() => LengthUnit::Mm.to_m(),

@@ -12,7 +12,6 @@ use crate::ranges::Ranged;
 use crate::records::{ChunkIndex, Cursor, ENVELOPE, RawRecord, Records, Statistics};
 use crate::report::Source;
 use crate::sweep::Tally;
-use bytes::Bytes;
 use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -78,8 +77,8 @@ pub(crate) fn find_within(file: &Ranged, allowance: &Allowance) -> Result<Found,
     };
     let crc = Cursor::new(data_end.body).u32().filter(|crc| *crc != 0);
     let data = summary_start - DATA_END_BYTES;
-    let listed = Bytes::copy_from_slice(&summary[..end - summary_start]);
-    let layout = Summary::parse(&listed).and_then(|summary| summary.layout(&head, data, allowance));
+    let layout = Summary::parse(&summary[..end - summary_start])
+        .and_then(|summary| summary.layout(&head, data, allowance));
     let layout =
         layout.map(|layout| Layout { data_crc: crc.map(|crc| DataCrc { end: data, crc }), ..layout });
     Ok(layout.map_or_else(Found::Unusable, |layout| Found::Layout(Box::new(layout))))
@@ -177,7 +176,7 @@ impl Summary {
         }
         let listed = self.chunks.iter().flat_map(|c| c.message_indexes.keys());
         let mut used = listed.chain(statistics.channel_message_counts.keys());
-        if used.any(|id| !self.definitions.contains(*id)) {
+        if used.any(|id| self.definitions.channel(*id).is_none()) {
             return Err("its summary does not define all of its channels");
         }
         let counted: u64 = statistics.channel_message_counts.values().fold(0, |n, c| n.saturating_add(*c));
@@ -207,6 +206,7 @@ impl Summary {
                 content: Content::Chunk { body, indexes: indexes.clone() },
                 holds: indexed.then(|| chunk.message_indexes.keys().copied().collect()),
                 inflates_to: Some(chunk.inflates_to),
+                claim: chunk.inflates_to,
             };
             known.push((record.start..indexes.end, Some(block)));
         }

@@ -28,7 +28,8 @@ pub(crate) fn judged(
     each: &mut dyn FnMut(&Message<'_>),
 ) -> Judged {
     let block = &file.layout.blocks[at.block];
-    let mut pass = Pass { file, at, survey: FileSurvey::default(), short: 0, each };
+    let survey = FileSurvey { definitions: file.layout.definitions.beside(), ..FileSurvey::default() };
+    let mut pass = Pass { file, at, survey, short: 0, each };
     let mut inflated = None;
     match (&block.content, stored(file, at, fetched)) {
         (_, Err(why)) => pass.lost(block.offset, || format!("chunk dropped: {why}")),
@@ -51,17 +52,6 @@ pub(crate) fn judged(
         pass.lost(block.offset, || format!("messages shorter than their header are dropped ({short} here)"));
     }
     Judged { survey: pass.survey, inflated }
-}
-
-/// What inflating a block makes by its own account [bytes].
-pub(crate) fn inflates_to(file: &RecordingFile, at: At, fetched: Option<&Bytes>) -> u64 {
-    let claim = |body: &[u8]| ChunkHeader::parse(body).map_or(0, |(header, _)| header.inflates_to());
-    match (&file.layout.blocks[at.block].content, stored(file, at, fetched)) {
-        (_, Err(_)) => 0,
-        (Content::Chunk { .. } | Content::CutChunk(_), Ok((body, _))) => claim(body),
-        // Blocks are cut so that it is little.
-        (Content::Records(_), Ok((bytes, _))) => bytes.len() as u64,
-    }
 }
 
 /// The bytes of a block as they are in the file: the body of a chunk and the message indexes behind it, or records.
@@ -150,7 +140,7 @@ impl Pass<'_> {
                 // Those of the summary may come from other places of the file; all must be the same.
                 let layout = &self.file.layout;
                 let mut said = layout.definitions.check(&record);
-                if !layout.definitions_complete {
+                if !layout.definitions_complete && !layout.definitions.has(&record) {
                     said = said.and(self.survey.definitions.absorb(&record));
                 }
                 if let Err(why) = said {

@@ -47,12 +47,14 @@ pub(crate) struct Block {
     pub holds: Option<Vec<u16>>,
     /// What it inflates to [bytes], where the index says and the chunk itself was not looked at.
     pub inflates_to: Option<u64>,
+    /// What a pass inflates of it [bytes].
+    pub claim: u64,
 }
 
 impl Block {
     /// A block of which only looking tells what it holds.
     pub fn of(offset: usize, content: Content) -> Block {
-        Block { offset, content, holds: None, inflates_to: None }
+        Block { offset, content, holds: None, inflates_to: None, claim: 0 }
     }
 
     /// Whether it is one chunk.
@@ -61,9 +63,14 @@ impl Block {
     }
 
     /// A chunk by itself, of whose message indexes nothing is known.
-    fn chunk(offset: usize, body: Range<usize>) -> Block {
+    fn chunk(offset: usize, body: Range<usize>, claim: u64) -> Block {
         let indexes = body.end..body.end;
-        Block::of(offset, Content::Chunk { body, indexes })
+        Block { claim, ..Block::of(offset, Content::Chunk { body, indexes }) }
+    }
+
+    /// What a pass holds of it at most [bytes].
+    pub fn held(&self) -> u64 {
+        self.claim.max(self.range().len() as u64)
     }
 
     /// The bytes to read for it, with the envelope of a chunk.
@@ -128,7 +135,7 @@ pub(crate) struct Layout {
     pub attachments: Vec<Range<usize>>,
     pub metadata: Vec<Range<usize>>,
     pub definitions: Definitions,
-    /// Whether `definitions` is known to be all there are; otherwise the chunks must be looked into.
+    /// Whether `definitions` are all there are; otherwise the chunks must be looked into.
     pub definitions_complete: bool,
     pub statistics: Option<Statistics>,
     pub data_crc: Option<DataCrc>,
@@ -138,8 +145,6 @@ pub(crate) struct Layout {
     pub faults: Faults,
     /// Log time of the first message or chunk [ns].
     pub first_ns: Option<u64>,
-    /// What inflating the chunks of the block under construction makes [bytes].
-    pub claimed: u64,
 }
 
 /// What a walk knows until it ends.
@@ -286,7 +291,7 @@ impl Layout {
         if range.len() < LARGE_CHUNK_BYTES && claim < LARGE_CLAIM_BYTES {
             return self.extend_records(range, claim);
         }
-        self.blocks.push(Block::chunk(range.start, body(record)));
+        self.blocks.push(Block::chunk(range.start, body(record), claim));
     }
 
     /// What inflating a chunk makes [bytes]; nothing, where that would be too much.
@@ -310,17 +315,16 @@ impl Layout {
     }
 
     fn extend_records(&mut self, range: Range<usize>, claim: u64) {
-        if let Some(Block { content: Content::Records(last), .. }) = self.blocks.last_mut()
+        if let Some(Block { content: Content::Records(last), claim: claimed, .. }) = self.blocks.last_mut()
             && last.end == range.start
             && last.len() < BLOCK_BYTES
-            && self.claimed < BLOCK_CLAIM_BYTES
+            && *claimed < BLOCK_CLAIM_BYTES
         {
             last.end = range.end;
-            self.claimed += claim;
+            *claimed += claim;
             return;
         }
-        self.claimed = claim;
-        self.blocks.push(Block::of(range.start, Content::Records(range)));
+        self.blocks.push(Block { claim, ..Block::of(range.start, Content::Records(range)) });
     }
 }
 

@@ -86,7 +86,7 @@ pub use guard::{
 pub use losses::losses;
 pub use mark::SET_POINTS_METADATA;
 pub use open::Recording;
-pub use raw::{Attachment, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};
+pub use raw::{Attachment, MetadataVisitor, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};
 pub use report::*;
 pub use seal::{is_marked, sealed};
 pub use streams::{

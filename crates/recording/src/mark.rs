@@ -158,10 +158,10 @@ fn of_mcap(file: File, path: &Path) -> Result<Option<Mark>, RecordingError> {
     }
     let borne = |(record, _): &&(&str, &str)| names.iter().any(|name| name == record);
     // Set-points of earlier versions have no record, but no other topics either.
-    let channels = layout.definitions.resolve();
-    let set_points = !channels.is_empty()
+    let mut channels = layout.definitions.channels().peekable();
+    let set_points = channels.peek().is_some()
         && names.is_empty()
-        && channels.values().all(|channel| channel.topic.starts_with("/joint_set_points"));
+        && channels.all(|(_, channel)| channel.topic.starts_with("/joint_set_points"));
     let earlier = || set_points.then_some(&RECORDS[2]);
     Ok(RECORDS.iter().find(borne).or_else(earlier).map(|(_, kind)| unsealed((*kind).to_owned())))
 }

@@ -3,12 +3,13 @@
 use crate::budget::Allowance;
 use crate::bytes::{Access, FileBytes};
 use crate::damage::{Damage, Faults};
+use crate::decode::Role;
 use crate::foreign::names::{files_of, is_recording, without_ending};
-use crate::foreign::{self, Converted};
+use crate::foreign::{self, Converted, DEFINITION_FROM};
 use crate::index::{self, Found};
 use crate::layout::Layout;
 use crate::raw::{RawChannel, RawSchema};
-use crate::sweep::{At, BlockSurvey, FileSurvey, Tally, sweep};
+use crate::sweep::{At, BlockSurvey, FileSurvey, Tally, sweep, together};
 use crate::{
     ChannelReport, Fetched, FileReport, ObjectIdentity, RecordingError, RecordingReport, Source, bag, decode,
     losses, witness,
@@ -25,6 +26,8 @@ pub struct Recording {
     /// What the passes made so far have found in each file.
     surveys: Mutex<Vec<FileSurvey>>,
     judged: OnceLock<JudgedFiles>,
+    /// What all passes may still inflate.
+    passes: Allowance,
 }
 
 /// What a recording is found to be.
@@ -41,7 +44,6 @@ pub(crate) struct RecordingFile {
     /// Set where `bytes` are a copy.
     copied: Option<Copied>,
     pub layout: Layout,
-    pub channels: BTreeMap<u16, Arc<RawChannel>>,
 }
 
 /// Channels that were not read whole.
@@ -75,8 +77,9 @@ enum Copied {
         damage: Vec<Damage>,
         /// Identity of the log that was read with it.
         log: String,
-        /// Whether the messages are in an MCAP file of somebody else's.
-        packed: bool,
+        /// Of a database: the types whose definitions are not its own. None where the messages are in an MCAP file of somebody
+        /// else's.
+        known_here: Option<BTreeSet<String>>,
     },
 }
 
@@ -109,7 +112,8 @@ impl Recording {
         let mut files = paths.par_iter().map(open).collect::<Result<Vec<_>, _>>()?;
         files.sort_by_key(|f| f.layout.first_ns.unwrap_or(u64::MAX));
         let surveys = Mutex::new(vec![FileSurvey::default(); files.len()]);
-        let mut recording = Recording { files, surveys, judged: OnceLock::new() };
+        let passes = Allowance::of_passes(files.iter().map(|file| file.original().len()).sum());
+        let mut recording = Recording { files, surveys, judged: OnceLock::new(), passes };
         recording.complete_definitions()?;
         Ok(recording)
     }
@@ -119,13 +123,29 @@ impl Recording {
         Allowance::of(self.files.iter().map(|file| file.original().len()).sum(), 1)
     }
 
-    /// Whether a pass stayed within its allowance.
+    /// Whether a pass stayed within its allowance, and all passes within theirs.
     ///
     /// # Errors
     /// It did not, so that messages are missing from what it gave.
     pub fn within(&self, allowance: &Allowance) -> Result<(), RecordingError> {
         match self.files.first().filter(|_| allowance.is_exceeded()) {
             Some(file) => Err(allowance.exceeded(&file.path)),
+            None => self.pay(allowance.taken()),
+        }
+    }
+
+    /// Pays for what a pass over these blocks inflates.
+    ///
+    /// # Errors
+    /// The passes before it took all that there was.
+    pub(crate) fn pays(&self, blocks: &[At]) -> Result<(), RecordingError> {
+        let claims = blocks.iter().map(|at| self.files[at.file].layout.blocks[at.block].claim);
+        self.pay(claims.fold(0, u64::saturating_add))
+    }
+
+    fn pay(&self, bytes: u64) -> Result<(), RecordingError> {
+        match self.files.first().filter(|_| !self.passes.takes(bytes)) {
+            Some(file) => Err(self.passes.exceeded(&file.path)),
             None => Ok(()),
         }
     }
@@ -175,7 +195,7 @@ impl Recording {
     fn judged(&self) -> &JudgedFiles {
         self.judged.get_or_init(|| {
             // Only fetching can fail, and of mapped files nothing is fetched.
-            if let Ok((found, _)) = sweep(&self.files, &self.unread(), |_| (), |(), _, _| ()) {
+            if let Ok((found, _)) = sweep(self, &self.unread(), |_| (), |(), _, _| ()) {
                 self.remember(found);
             }
             let hashed: Vec<_> = self.files.par_iter().map(RecordingFile::hashed).collect();
@@ -230,6 +250,12 @@ impl Recording {
         self.surveys.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Counts the messages of a block, unless a pass has; `remember` takes in the rest once the pass is over. The sum is the
+    /// same in any order.
+    pub(crate) fn count(&self, at: At, tallies: BTreeMap<u16, Tally>) {
+        self.surveys()[at.file].count_block(at.block, tallies);
+    }
+
     /// Blocks of mapped files that no pass has seen.
     fn unread(&self) -> Vec<At> {
         let surveys = self.surveys();
@@ -244,57 +270,72 @@ impl Recording {
     /// Looks into the chunks for definitions where no summary repeats them all.
     fn complete_definitions(&mut self) -> Result<(), RecordingError> {
         if self.files.iter().any(|f| !f.layout.definitions_complete) {
-            let (found, _) = sweep(&self.files, &self.unread(), |_| (), |(), _, _| ())?;
-            self.remember(found);
+            // Some blocks at a time, so that what each of them repeats is not held at once.
+            let (unread, most) = (self.unread(), 4 * rayon::current_num_threads());
+            let mut left = &unread[..];
+            while !left.is_empty() {
+                let now;
+                (now, left) = left.split_at(together(&self.files, left, most));
+                let (found, _) = sweep(self, now, |_| (), |(), _, _| ())?;
+                self.remember(found);
+                let surveys = self.surveys.get_mut().unwrap_or_else(PoisonError::into_inner);
+                for (file, survey) in self.files.iter_mut().zip(surveys) {
+                    if let Err(why) = file.layout.definitions.merge(std::mem::take(&mut survey.definitions)) {
+                        file.layout.faults.lost(0, || format!("in its chunks: {why}"));
+                    }
+                }
+            }
             let surveys = self.surveys.get_mut().unwrap_or_else(PoisonError::into_inner);
             for (file, survey) in self.files.iter_mut().zip(surveys) {
-                if !file.layout.definitions.merge(std::mem::take(&mut survey.definitions)) {
-                    let why = "its chunks define schemas or channels otherwise than the rest of the file";
-                    file.layout.faults.lost(0, || why.to_owned());
-                }
+                // Whoever reads a block again only compares with these.
+                file.layout.definitions_complete = true;
                 let first = survey.tallies.values().map(|t| t.first_ns).min();
                 file.layout.first_ns = first.or(file.layout.first_ns);
             }
         }
         for file in &mut self.files {
-            file.channels = file.layout.definitions.shared();
+            file.layout.definitions.resolve();
+            file.annotate();
         }
         Ok(())
     }
 
-    fn channel_reports(&self, surveys: &[FileSurvey]) -> Vec<ChannelReport> {
-        type Key<'a> = (&'a str, &'a str, &'a str, &'a str);
-        let mut merged: BTreeMap<Key<'_>, (Option<Tally>, &Arc<RawChannel>)> = BTreeMap::new();
+    fn channel_reports(&self, surveys: &[FileSurvey]) -> Arc<[ChannelReport]> {
+        let count = self.files.iter().map(|file| file.channels().count()).sum();
+        let mut found: Vec<(&RawChannel, Option<Tally>)> = Vec::with_capacity(count);
         for (file, survey) in self.files.iter().zip(surveys) {
             let unread = file.unread(survey);
-            for (id, channel) in &file.channels {
-                let (schema, encoding) =
-                    channel.schema.as_ref().map_or(("", ""), |s| (s.name.as_str(), s.encoding.as_str()));
-                let key = (channel.topic.as_str(), schema, encoding, channel.message_encoding.as_str());
-                let (tally, _) = merged.entry(key).or_insert_with(|| (None, channel));
-                if let Some(found) = file.tally(survey, &unread, *id) {
-                    tally.get_or_insert(Tally { messages: 0, ..found }).add(found);
-                }
-            }
+            found.extend(file.channels().map(|(id, channel)| (&**channel, file.tally(survey, &unread, id))));
         }
+        // The same channel of several files, or of several numbers, is one.
+        found.sort_by_key(|(channel, _)| named(channel));
+        found.dedup_by(|(channel, more), (before, tally)| {
+            let same = named(channel) == named(before);
+            if let Some(more) = more.filter(|_| same) {
+                tally.get_or_insert(Tally { messages: 0, ..more }).add(more);
+            }
+            same
+        });
         // Thousands of channels may share one schema, which is compiled once.
-        let mut known: BTreeMap<Compiled<'_>, Result<String, String>> = BTreeMap::new();
-        let mut reports = Vec::with_capacity(merged.len());
-        for (key, (tally, channel)) in merged {
+        let mut known: BTreeMap<Compiled<'_>, Result<&'static str, Arc<str>>> = BTreeMap::new();
+        let none: Arc<str> = "".into();
+        let report = |(channel, tally): (_, Option<Tally>)| {
+            let channel: &RawChannel = channel;
             let tally = tally.unwrap_or(Tally { messages: 0, first_ns: 0, last_ns: 0 });
-            let compiled = (channel.schema.as_ref().map(Arc::as_ptr), channel.message_encoding.as_str());
-            reports.push(ChannelReport {
-                topic: key.0.to_owned(),
-                schema: key.1.to_owned(),
-                schema_encoding: key.2.to_owned(),
-                message_encoding: key.3.to_owned(),
+            let schema = channel.schema.as_ref();
+            let compiled = (schema.map(Arc::as_ptr), &*channel.message_encoding);
+            ChannelReport {
+                topic: channel.topic.clone(),
+                schema: schema.map_or(&none, |schema| &schema.name).clone(),
+                schema_encoding: schema.map_or(&none, |schema| &schema.encoding).clone(),
+                message_encoding: channel.message_encoding.clone(),
                 messages: tally.messages,
                 first_ns: ns(tally.first_ns),
                 last_ns: ns(tally.last_ns),
                 decodable: known.entry(compiled).or_insert_with(|| readable_as(channel)).clone(),
-            });
-        }
-        reports
+            }
+        };
+        found.into_iter().map(report).collect()
     }
 }
 
@@ -313,7 +354,6 @@ impl RecordingFile {
             bytes: FileBytes::open(path, access)?,
             copied: None,
             layout: Layout::default(),
-            channels: BTreeMap::new(),
         };
         let allowance = Allowance::of(file.bytes.len(), files);
         if let FileBytes::Ranged(ranged) = &file.bytes {
@@ -344,13 +384,28 @@ impl RecordingFile {
     fn converted(mut self, why: String, allowance: &Allowance) -> Result<RecordingFile, RecordingError> {
         let not_mcap = |why: String| RecordingError::NotMcap { path: self.path.clone(), why };
         let converted = foreign::convert(&self.bytes, &self.path, allowance)?;
-        let Some(Converted { map, damage, log, packed }) = converted else {
+        let Some(Converted { map, damage, log, known_here }) = converted else {
             return Err(not_mcap(why));
         };
         self.layout = Layout::of(&map, allowance).map_err(not_mcap)?;
         let original = std::mem::replace(&mut self.bytes, FileBytes::Mapped(map));
-        self.copied = Some(Copied::Messages { original, damage, log, packed });
+        self.copied = Some(Copied::Messages { original, damage, log, known_here });
         Ok(self)
+    }
+
+    /// Its channels by number.
+    pub fn channels(&self) -> impl Iterator<Item = (u16, &Arc<RawChannel>)> {
+        self.layout.definitions.channels()
+    }
+
+    /// Notes at the channels of a database where their definitions are from.
+    fn annotate(&mut self) {
+        let Some(Copied::Messages { known_here: Some(known), .. }) = &self.copied else { return };
+        self.layout.definitions.annotate(|channel| {
+            let schema = channel.schema.as_ref().filter(|schema| !schema.data.is_empty())?;
+            let from = if known.contains(&*schema.name) { "armcal" } else { "bag" };
+            Some((DEFINITION_FROM.to_owned(), from.to_owned()))
+        });
     }
 
     /// An object is identified by its store, copied or not.
@@ -362,9 +417,9 @@ impl RecordingFile {
             _ => bytes.identity(data_end)?,
         };
         match (&self.copied, &self.bytes) {
-            (Some(Copied::Messages { log, packed, .. }), FileBytes::Mapped(map)) => {
+            (Some(Copied::Messages { log, known_here, .. }), FileBytes::Mapped(map)) => {
                 identity += log;
-                crc = packed.then(|| map.crc(data_end));
+                crc = known_here.is_none().then(|| map.crc(data_end));
             }
             (Some(_), FileBytes::Mapped(map)) if crc.is_none() => crc = Some(map.crc(data_end)),
             _ => {}
@@ -468,13 +523,19 @@ pub(crate) fn ns(unsigned: u64) -> i64 {
 /// What decides how messages are read: a schema in memory, and the message encoding.
 type Compiled<'a> = (Option<*const RawSchema>, &'a str);
 
-fn readable_as(channel: &RawChannel) -> Result<String, String> {
+/// What makes channels one in a report: topic, schema, its encoding, that of the messages.
+fn named(channel: &RawChannel) -> [&str; 4] {
+    let (schema, encoding) = channel.schema.as_ref().map_or(("", ""), |s| (&*s.name, &*s.encoding));
+    [&channel.topic, schema, encoding, &channel.message_encoding]
+}
+
+fn readable_as(channel: &RawChannel) -> Result<&'static str, Arc<str>> {
     let Some(schema) = &channel.schema else {
-        return Err("the channel has no schema".to_owned());
+        return Err("the channel has no schema".into());
     };
     decode::readable_as(&schema.name, &schema.encoding, &schema.data, &channel.message_encoding)
-        .map(|role| role.name().to_owned())
-        .map_err(|e| e.to_string())
+        .map(Role::name)
+        .map_err(|e| e.to_string().into())
 }
 
 /// The same file twice, or a part of a bag beside what it was converted to, would silently double every message.

@@ -13,9 +13,9 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RawSchema {
     /// Name, such as `sensor_msgs/msg/JointState`.
-    pub name: String,
+    pub name: Arc<str>,
     /// Encoding (`ros2msg`, `protobuf`, ...).
-    pub encoding: String,
+    pub encoding: Arc<str>,
     /// The schema itself.
     pub data: Vec<u8>,
 }
@@ -28,9 +28,9 @@ pub struct RawChannel {
     /// Schema; a channel may have none.
     pub schema: Option<Arc<RawSchema>>,
     /// Message encoding (`cdr`, `protobuf`, ...).
-    pub message_encoding: String,
+    pub message_encoding: Arc<str>,
     /// Free-form metadata, such as QoS.
-    pub metadata: BTreeMap<String, String>,
+    pub metadata: Vec<(String, String)>,
 }
 
 /// One message, its bytes borrowed.
@@ -89,6 +89,9 @@ pub type RawMetadata = (String, BTreeMap<String, String>);
 /// Takes messages in order; an error stops the pass.
 pub type RawVisitor<'a> = dyn FnMut(RawMessage<'_>) -> Result<(), RecordingError> + Send + 'a;
 
+/// Takes metadata records in order, by name and entries; an error stops the pass.
+pub type MetadataVisitor<'a> = dyn FnMut(&str, &BTreeMap<String, String>) -> Result<(), RecordingError> + 'a;
+
 impl Recording {
     /// Hands every sound message to `f`, file by file in time order, in file order within each. Messages whose
     /// channel definition is lost are not handed out. The first error stops the pass.
@@ -103,11 +106,12 @@ impl Recording {
         f: &mut RawVisitor<'_>,
     ) -> Result<(), RecordingError> {
         let ids = |file: &RecordingFile| -> BTreeSet<u16> {
-            file.channels.iter().filter(|(_, channel)| wanted(channel)).map(|(id, _)| *id).collect()
+            file.channels().filter(|(_, channel)| wanted(channel)).map(|(id, _)| id).collect()
         };
         let ids: Vec<BTreeSet<u16>> = self.files.iter().map(ids).collect();
-        let done =
-            for_each_batch(&self.files, &blocks(&self.files, &ids), |batch| self.hand_out(&batch, &ids, f));
+        let blocks = blocks(&self.files, &ids);
+        self.pays(&blocks)?;
+        let done = for_each_batch(&self.files, &blocks, |batch| self.hand_out(&batch, &ids, f));
         self.files.iter().try_for_each(RecordingFile::unshortened)?;
         done
     }
@@ -122,7 +126,7 @@ impl Recording {
         let ahead = 2 * rayon::current_num_threads();
         let (mut blocks_left, mut fetched_left) = (batch.blocks, &batch.fetched[..]);
         while !blocks_left.is_empty() {
-            let count = together(&self.files, blocks_left, fetched_left, ahead);
+            let count = together(&self.files, blocks_left, ahead);
             let (blocks, fetched);
             (blocks, blocks_left) = blocks_left.split_at(count);
             (fetched, fetched_left) = fetched_left.split_at(count);
@@ -137,7 +141,7 @@ impl Recording {
                     if !ids[at.file].contains(&message.channel_id) {
                         continue;
                     }
-                    if let Some(channel) = file.channels.get(&message.channel_id) {
+                    if let Some(channel) = file.layout.definitions.channel(message.channel_id) {
                         f(RawMessage {
                             channel,
                             sequence: message.sequence,
@@ -170,17 +174,33 @@ impl Recording {
         Ok(())
     }
 
-    /// Every metadata record that can be read, as (name, entries), in file order.
+    /// Hands every metadata record that can be read to `f`, one at a time in memory, in file order. The first error stops
+    /// the pass.
+    pub fn for_each_metadata(&self, f: &mut MetadataVisitor<'_>) -> Result<(), RecordingError> {
+        for file in &self.files {
+            for range in &file.layout.metadata {
+                let body = file.bytes.read(range.clone())?;
+                parse_metadata(&body).map_or(Ok(()), |(name, entries)| f(&name, &entries))?;
+                file.bytes.passed(range.clone());
+            }
+        }
+        Ok(())
+    }
+
+    /// All of them, as (name, entries).
     pub fn metadata(&self) -> Result<Vec<RawMetadata>, RecordingError> {
-        let ranges = self.files.iter().flat_map(|file| file.layout.metadata.iter().map(move |r| (file, r)));
-        let bodies = ranges.map(|(file, range)| file.bytes.read(range.clone()));
-        bodies.filter_map(|body| body.map(|body| parse_metadata(&body)).transpose()).collect()
+        let mut all = Vec::new();
+        self.for_each_metadata(&mut |name, entries| {
+            all.push((name.to_owned(), entries.clone()));
+            Ok(())
+        })?;
+        Ok(all)
     }
 
     /// Every channel of the recording, in file order, each once.
     pub fn channels(&self) -> Vec<Arc<RawChannel>> {
         let mut known: HashSet<&RawChannel> = HashSet::new();
-        let all = self.files.iter().flat_map(|file| file.channels.values());
+        let all = self.files.iter().flat_map(|file| file.channels().map(|(_, channel)| channel));
         all.filter(|channel| known.insert(channel)).cloned().collect()
     }
 }

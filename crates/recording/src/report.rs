@@ -3,6 +3,7 @@
 use armcal_core::Warning;
 use serde::Serialize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// How the records of a file were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -76,11 +77,11 @@ pub struct ChannelReport {
     /// Topic.
     pub topic: String,
     /// Schema name, such as `sensor_msgs/msg/JointState`.
-    pub schema: String,
+    pub schema: Arc<str>,
     /// Schema encoding (`ros2msg`, `ros1msg`, `protobuf`, `jsonschema`, ...).
-    pub schema_encoding: String,
+    pub schema_encoding: Arc<str>,
     /// Message encoding (`cdr`, `ros1`, `protobuf`, `json`, ...).
-    pub message_encoding: String,
+    pub message_encoding: Arc<str>,
     /// Messages found; for channels that were not read of a file read by ranges, what its summary declares.
     pub messages: u64,
     /// First log time [ns].
@@ -88,7 +89,7 @@ pub struct ChannelReport {
     /// Last log time [ns].
     pub last_ns: i64,
     /// What armcal can read it as (`joints`, `pose`, `temperature`), or why it cannot.
-    pub decodable: Result<String, String>,
+    pub decodable: Result<&'static str, Arc<str>>,
 }
 
 /// Which stamp of a message its time was taken from.
@@ -180,8 +181,8 @@ impl Occlusion {
 pub struct RecordingReport {
     /// Its files, in time order.
     pub files: Vec<FileReport>,
-    /// Its channels, by topic.
-    pub channels: Vec<ChannelReport>,
+    /// Its channels, by topic; whoever keeps the report shares them.
+    pub channels: Arc<[ChannelReport]>,
     /// Its streams, once a pipeline has named them.
     pub streams: Vec<StreamReport>,
     /// What the user should know.

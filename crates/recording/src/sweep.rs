@@ -3,16 +3,16 @@
 //! Of a mapped file every block is passed over, so that all of it is judged. Of a file read by ranges only those blocks
 //! are that may hold a wanted channel: some at a time, the next ones on their way while these are worked on.
 
-use crate::RecordingError;
 use crate::budget::BUDGET_BYTES;
 use crate::bytes::FileBytes;
 use crate::channels::Definitions;
 use crate::chunk::Inflater;
 use crate::damage::Faults;
 use crate::index::holding;
-use crate::judge::{Judged, inflates_to, judged};
+use crate::judge::{Judged, judged};
 use crate::open::RecordingFile;
 use crate::records::{Message, RawRecord, Records};
+use crate::{Recording, RecordingError};
 use bytes::Bytes;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,13 +65,23 @@ pub(crate) struct FileSurvey {
     pub faults: Faults,
     /// Blocks that were passed over.
     pub passed: BTreeSet<usize>,
+    /// Blocks whose messages are in `tallies`: these, and those of a pass that goes on.
+    pub counted: BTreeSet<usize>,
 }
 
 impl FileSurvey {
     /// Takes in what a block showed, unless an earlier pass has.
-    pub fn add(&mut self, block: usize, found: FileSurvey) {
+    pub fn add(&mut self, block: usize, mut found: FileSurvey) {
+        self.count_block(block, std::mem::take(&mut found.tallies));
         if self.passed.insert(block) {
             self.merge(found);
+        }
+    }
+
+    /// Takes in the messages of a block, unless that was done.
+    pub fn count_block(&mut self, block: usize, tallies: BTreeMap<u16, Tally>) {
+        if self.counted.insert(block) {
+            tallies.into_iter().for_each(|(channel, tally)| self.count(channel, tally));
         }
     }
 
@@ -81,9 +91,8 @@ impl FileSurvey {
     }
 
     fn merge(&mut self, other: FileSurvey) {
-        other.tallies.into_iter().for_each(|(channel, tally)| self.count(channel, tally));
-        if !self.definitions.merge(other.definitions) {
-            self.faults.lost(0, || "chunks define schemas or channels of one number differently".to_owned());
+        if let Err(why) = self.definitions.merge(other.definitions) {
+            self.faults.lost(0, || format!("in its chunks: {why}"));
         }
         self.faults.merge(other.faults);
     }
@@ -94,22 +103,26 @@ pub(crate) type BlockSurvey = (At, FileSurvey);
 
 /// Passes over blocks. `start` makes the collector of a stretch of consecutive blocks, given which share of all blocks that
 /// is; `each` sees every sound message of them in order. Returns a survey of each block, and the collectors, both in file
-/// order. How long stretches are depends on the threads: what is collected must be the same once it is put together.
+/// order; the messages in it are counted as it goes, for a survey holds each of its channels. How long stretches are depends on the threads: what is collected must be the same once it is put together.
 ///
 /// # Errors
-/// Bytes that cannot be fetched; of mapped files there are none.
+/// Bytes that cannot be fetched, of which mapped files have none; more passes than what they inflate to allows for.
 pub(crate) fn sweep<C: Send>(
-    files: &[RecordingFile],
+    recording: &Recording,
     blocks: &[At],
     start: impl Fn(f64) -> C + Sync,
     each: impl Fn(&mut C, At, &Message<'_>) + Sync,
 ) -> Result<(Vec<BlockSurvey>, Vec<C>), RecordingError> {
+    recording.pays(blocks)?;
+    let files = &recording.files;
     let one = |inflater: &mut Inflater, collector: &mut C, at: At, fetched: Option<&Bytes>| {
         let file = &files[at.file];
         let range = file.layout.blocks[at.block].range();
         // Hashing streams through the bytes, and leaves them in the cache for inflating, which does not.
         file.bytes.hash(&range);
-        let survey = judged(file, at, fetched, inflater, &mut |message| each(collector, at, message)).survey;
+        let judged = judged(file, at, fetched, inflater, &mut |message| each(collector, at, message));
+        let mut survey = judged.survey;
+        recording.count(at, std::mem::take(&mut survey.tallies));
         inflater.done();
         file.bytes.passed(range);
         (at, survey)
@@ -195,16 +208,10 @@ fn fetch<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Result<Batch<'a>, Rec
     Ok(Batch { blocks, fetched })
 }
 
-/// How many blocks from the first on are inflated together: at most `most`, and within the budget by what they claim.
-pub(crate) fn together(
-    files: &[RecordingFile],
-    blocks: &[At],
-    fetched: &[Option<Bytes>],
-    most: usize,
-) -> usize {
-    let claim = |(at, fetched): (&At, &Option<Bytes>)| inflates_to(&files[at.file], *at, fetched.as_ref());
-    let sums = blocks.iter().zip(fetched).scan(0_u64, |sum, block| {
-        *sum = sum.saturating_add(claim(block));
+/// How many blocks from the first on are held together: at most `most`, and within the budget.
+pub(crate) fn together(files: &[RecordingFile], blocks: &[At], most: usize) -> usize {
+    let sums = blocks.iter().scan(0_u64, |sum, at| {
+        *sum = sum.saturating_add(files[at.file].layout.blocks[at.block].held());
         Some(*sum)
     });
     sums.take(most).take_while(|sum| *sum <= BUDGET_BYTES as u64).count().max(1)

@@ -18,7 +18,8 @@ pub(crate) fn compare(file: &RecordingFile, survey: &FileSurvey) -> Faults {
     let mut faults = file.layout.faults.clone();
     faults.merge(survey.faults.clone());
     faults.extend(file.copy_damage());
-    for (id, tally) in survey.tallies.iter().filter(|(id, _)| !file.channels.contains_key(id)) {
+    for (id, tally) in survey.tallies.iter().filter(|(id, _)| file.layout.definitions.channel(**id).is_none())
+    {
         faults.lost(0, || {
             format!("{} messages of channel {id}, whose definition is lost, cannot be used", tally.messages)
         });
@@ -78,7 +79,8 @@ fn compare_messages(file: &RecordingFile, survey: &FileSurvey, statistics: &Stat
     for (id, declared) in declared.chain(undeclared).filter(|(id, _)| !unread.has(*id)) {
         let found = found(&id);
         if declared != found {
-            let name = file.channels.get(&id).map_or_else(|| format!("channel {id}"), |c| c.topic.clone());
+            let channel = file.layout.definitions.channel(id);
+            let name = channel.map_or_else(|| format!("channel {id}"), |c| c.topic.clone());
             faults.lost(0, || {
                 format!("its statistics declare {declared} messages on {name}, {found} are usable")
             });

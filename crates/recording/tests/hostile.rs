@@ -159,6 +159,32 @@ fn messages_that_are_bombs_end_the_pass() {
     assert!(said.is_err_and(|e| e.contains("inflates to more") && e.contains("ARMCAL_INFLATE_MIB")));
 }
 
+/// What one pass may inflate is inflated by ten of them and no more: nobody has a recording read again and again.
+#[test]
+fn passes_over_a_recording_are_limited_together() {
+    let _alone = alone();
+    // A record of somebody else's, of 1 MiB.
+    let records = record(0x90, &vec![0; (1 << 20) - 9]);
+    let packed = zstd::bulk::compress(&records, 3).expect("compresses");
+    let bytes = file(&vec![chunk(b"zstd", records.len() as u64, &packed); 7]);
+    recordings::on_disk(&bytes, |path| {
+        let recording = Recording::open(&[path.to_owned()]).expect("an MCAP file");
+        let mut passes = 1;
+        let refused = loop {
+            match recording.for_each_raw(&mut |_| Ok(())) {
+                Ok(()) => passes += 1,
+                Err(e) => break e.to_string(),
+            }
+        };
+        // 8 MiB and a hundred times the file are a little more than the 7 MiB that it inflates to.
+        assert!((10..15).contains(&passes), "{passes}");
+        assert!(
+            refused.contains("read again and again") && refused.contains("ARMCAL_INFLATE_MIB"),
+            "{refused}"
+        );
+    });
+}
+
 /// What is remembered of a file does not grow with its records: ten times as many take no more.
 #[test]
 fn records_that_say_nothing_take_no_memory_each() {
@@ -190,6 +216,84 @@ fn records_that_say_nothing_take_no_memory_each() {
         // Where each chunk is, while the index is compared with that: less than the chunk itself.
         assert!(many <= few + (256 << 10) + 2 * each * 200_000, "{what}: {few} and {many}");
     }
+}
+
+/// What a file defines, lists or attaches takes memory in proportion, and all that a file can define within the bar: 64 MiB
+/// with the program itself, which is 20 of them.
+#[test]
+fn definitions_and_lists_take_memory_in_proportion() {
+    let _alone = alone();
+    let schema = |id: u16, data: &str| {
+        let name = format!("a/J{id}");
+        let text = [text(name.as_bytes()), text(b"ros2msg"), text(data.as_bytes())].concat();
+        record(SCHEMA, &[&id.to_le_bytes()[..], &text].concat())
+    };
+    let channel = |id: u16, schema: u16, metadata: &[u8]| {
+        let topic = format!("/topic{id}");
+        let texts = [text(topic.as_bytes()), text(b"cdr"), text(metadata)].concat();
+        record(CHANNEL, &[&id.to_le_bytes()[..], &schema.to_le_bytes(), &texts].concat())
+    };
+    let joints = "string[] name\nfloat64[] position\n";
+    let entry = [text(b"a"), text(b"b")].concat();
+    let message = |id: u16| record(MESSAGE, &[&id.to_le_bytes()[..], &[0; 20 + 5]].concat());
+    type One<'a> = &'a dyn Fn(u16) -> Vec<u8>;
+    let kinds: [(&str, One<'_>); 7] = [
+        ("channels", &|id| channel(id, 0, b"")),
+        ("channels with metadata", &|id| channel(id, 0, &entry)),
+        ("schemas", &|id| [schema(id, joints), channel(id, id, b"")].concat()),
+        ("schemas that cannot be read", &|id| [schema(id, "x"), channel(id, id, b"")].concat()),
+        ("a chunk a channel", &|id| {
+            let records = [schema(id, joints), channel(id, id, b""), message(id)].concat();
+            chunk(b"", records.len() as u64, &records)
+        }),
+        ("attachments", &|_| record(ATTACHMENT, &[0; 36])),
+        ("metadata records", &|_| record(METADATA, &[0; 8])),
+    ];
+    for (what, one) in kinds {
+        let peak = |n: u16| {
+            let bytes = file(&(1..n).map(one).collect::<Vec<_>>());
+            let read = || {
+                recordings::on_disk(&bytes, |path| {
+                    let recording = Recording::open(&[path.to_owned()]).expect("an MCAP file");
+                    recording.report().channels.len()
+                })
+            };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+            pool.install(|| peak_bytes(read)).1
+        };
+        let (few, many) = (peak(16_000), peak(64_000));
+        assert!(many <= 4 * few + (1 << 20), "{what}: {few} and {many}");
+        assert!(many <= 44 << 20, "{what}: {many} bytes allocated");
+    }
+}
+
+/// A schema of 1 MiB in each of 200 chunks, which compresses well: the same one is held once, and of different ones no more than
+/// is allowed.
+#[test]
+fn definitions_in_chunks_are_held_once_and_to_their_limit() {
+    let _alone = alone();
+    let chunk_of = |id: u16| {
+        let noise: Vec<u8> = (0..5_000_u32)
+            .flat_map(|i| (i + u32::from(id)).wrapping_mul(2_654_435_761).to_le_bytes())
+            .collect();
+        let texts = [text(b"a/J"), text(b"ros2msg"), text(&noise.repeat(50))].concat();
+        let records = record(SCHEMA, &[&id.to_le_bytes()[..], &texts].concat());
+        let packed = zstd::bulk::compress(&records, 3).expect("compresses");
+        chunk(b"zstd", records.len() as u64, &packed)
+    };
+    let report = |what: &str, most_bytes: usize, chunks: &[Vec<u8>]| {
+        let bytes = file(chunks);
+        measured(what, most_bytes, || {
+            let open =
+                |path: &std::path::Path| Recording::open(&[path.to_owned()]).map(|r| r.report().clone());
+            recordings::on_disk(&bytes, open).expect("an MCAP file")
+        })
+    };
+    // Four chunks at a time for each thread, and what is kept.
+    let same = report("the same", 6 << 20, &vec![chunk_of(1); 200]);
+    assert_eq!(same.warnings, []);
+    let others = report("others", 48 << 20, &(1..=200).map(chunk_of).collect::<Vec<_>>());
+    assert!(others.warnings.iter().any(|w| w.message.contains("32 MiB")), "{:?}", others.warnings);
 }
 
 #[test]

@@ -100,8 +100,9 @@ fn copy_messages(input: &Recording, out: &mut McapOutput) -> Result<(), Recordin
 }
 
 fn add_channel(channel: &RawChannel, out: &mut McapOutput) -> Result<u16, RecordingError> {
-    let schema = channel.schema.as_ref().map(|s| (s.name.as_str(), s.encoding.as_str(), s.data.as_slice()));
-    out.add_channel(&channel.topic, schema, &channel.message_encoding, &channel.metadata)
+    let schema = channel.schema.as_ref().map(|s| (&*s.name, &*s.encoding, s.data.as_slice()));
+    let metadata = channel.metadata.iter().cloned().collect();
+    out.add_channel(&channel.topic, schema, &channel.message_encoding, &metadata)
 }
 
 /// Attachments and metadata of the input, without those of an earlier run.
@@ -112,12 +113,10 @@ fn copy_extras(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingE
         }
         out.attach(a.name, a.media_type, a.log_ns, a.create_ns, a.data)
     })?;
-    for (name, entries) in input.metadata()? {
-        if !name.starts_with(OWN) {
-            out.metadata(&name, &entries)?;
-        }
-    }
-    Ok(())
+    input.for_each_metadata(&mut |name, entries| match name.starts_with(OWN) {
+        true => Ok(()),
+        false => out.metadata(name, entries),
+    })
 }
 
 fn put_results(results: Vec<ResultMessage>, out: &mut McapOutput) -> Result<(), RecordingError> {

@@ -82,9 +82,9 @@ impl Keys {
     fn identity(&self, path: &Path) -> Result<String, armcal_recording::RecordingError> {
         let name = path.to_string_lossy().into_owned();
         let memory = self.out.join(SEEN).join(format!("{}.json", &hash([name.clone()])[..32]));
-        let beside = read_with(path);
-        let sizes: Option<Vec<_>> =
-            std::iter::once(path).chain(beside.iter().map(PathBuf::as_path)).map(size).collect();
+        let (logs, description) = read_with(path);
+        let beside = logs.iter().chain(&description).map(PathBuf::as_path);
+        let sizes: Option<Vec<_>> = std::iter::once(path).chain(beside).map(size).collect();
         // Armcal's own notes, to be written over: no input.
         let known = input::regular(&memory)
             .ok()
@@ -96,11 +96,11 @@ impl Keys {
                 return Ok(known.identity);
             }
         }
-        let mut parts = vec![identity_of(path)?];
-        for path in &beside {
-            parts.push(identity_of(path)?);
-        }
-        let identity = if beside.is_empty() { parts.remove(0) } else { hash(parts) };
+        let own = identity_of(path)?;
+        let identity = match description {
+            None => own,
+            Some(description) => hash([own, identity_of(&description)?]),
+        };
         if let Some(sizes) = sizes {
             let seen = Seen { schema: SCHEMA.to_owned(), path: name, sizes, identity: identity.clone() };
             // A memory that cannot be written costs time only.

@@ -28,7 +28,7 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
     };
     if json {
         let named: Vec<Named<'_>> = reports.iter().map(|(name, report)| Named { name, report }).collect();
-        print(&super::json_text(&named)?)?;
+        crate::stdout::print_json(&named)?;
     } else {
         for (name, report) in &reports {
             print(&text(name, report))?;
@@ -136,7 +136,10 @@ fn channels(channels: &[ChannelReport]) -> Table {
             format!("{rate_hz:.1}"),
             format!("{:.2}", (c.first_ns - start_ns) as f64 * 1e-9),
             format!("{duration_s:.2}"),
-            c.decodable.clone().unwrap_or_else(|why| format!("no: {}", printable(&shortened(&why)))),
+            match &c.decodable {
+                Ok(role) => (*role).to_owned(),
+                Err(why) => format!("no: {}", printable(&shortened(why))),
+            },
         ]);
     }
     table

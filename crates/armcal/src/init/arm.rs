@@ -68,6 +68,23 @@ impl Arm {
         Ok(bare(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())?)
     }
 
+    /// The links that the tip may be, of a URDF, with their places on the first of them. They are fixed to each other, so all of
+    /// them are read at once, and put where they are in any posture.
+    pub fn tip_places(&self) -> Result<Vec<(Option<String>, Pose)>, Error> {
+        let Some((first, others)) = self.tips.split_first() else {
+            return Ok(vec![(None, Pose::identity())]);
+        };
+        let base = self.base_link.as_deref().unwrap_or_default();
+        let others: Vec<&str> = others.iter().map(String::as_str).collect();
+        let chain = Chain::from_urdf_branches(&self.text, base, first, &others, &self.file)?;
+        let (model, zeros) = (bare(&chain, Vec::new())?, vec![0.0; chain.joint_names().len()]);
+        let frames = model.link_frames(&model.nominal(), &zeros);
+        let in_base: BTreeMap<&str, Pose> = frames.iter().map(|f| (f.name.as_str(), f.in_base)).collect();
+        let first = in_base.get(first.as_str()).map_or(Pose::identity(), Pose::inverse);
+        let place = |tip: &String| Some((Some(tip.clone()), first * in_base.get(tip.as_str())?));
+        Ok(self.tips.iter().filter_map(place).collect())
+    }
+
     /// The links that the joints carry, then the tip, in the base.
     pub fn poses(&self, joint_rad: &[f64]) -> Vec<Pose> {
         let p = self.model.nominal();
@@ -293,9 +310,11 @@ fn from_urdf(
     let unnamed = named.is_empty() && chosen(told, channels).next().is_some();
     let is_read = |l: &Link<'_>| l.moves && (unnamed || named.contains(l.joint));
     // Fingers: joints that share a parent link and end there.
-    let read_on = |parent: &str| joints.values().filter(|l| is_read(l) && l.parent == parent).count();
-    let counts = |l: &Link<'_>| is_read(l) && !(l.slides && read_on(l.parent) > 1);
-    let depth = |link: &&str| path(&joints, link).iter().filter(|child| counts(&joints[**child])).count();
+    let mut read_on: BTreeMap<&str, usize> = BTreeMap::new();
+    joints.values().filter(|l| is_read(l)).for_each(|l| *read_on.entry(l.parent).or_default() += 1);
+    let counts = |l: &Link<'_>| is_read(l) && !(l.slides && read_on[l.parent] > 1);
+    let depths = depths(&joints, counts);
+    let depth = |link: &&str| depths[link];
     let ends: Vec<&str> = joints.iter().filter(|(_, l)| counts(l)).map(|(child, _)| *child).collect();
     let deepest = ends.iter().map(&depth).max().unwrap_or(0);
     let end = match &told.tip_link {
@@ -390,13 +409,42 @@ fn path<'a>(joints: &BTreeMap<&'a str, Link<'a>>, link: &str) -> Vec<&'a str> {
     way
 }
 
+/// How many joints that count lead from the root to each link, itself included: each is asked once, however they hang together.
+fn depths<'a>(
+    joints: &BTreeMap<&'a str, Link<'a>>,
+    counts: impl Fn(&Link<'_>) -> bool,
+) -> BTreeMap<&'a str, usize> {
+    let mut depths: BTreeMap<&str, usize> = BTreeMap::new();
+    for link in joints.keys() {
+        let (mut way, mut at) = (Vec::new(), *link);
+        // Joints that form a loop have no root: each of them begins at zero.
+        while let Some((link, joint)) =
+            joints.get_key_value(at).filter(|(link, _)| !depths.contains_key(*link))
+        {
+            depths.insert(link, 0);
+            way.push((*link, joint));
+            at = joint.parent;
+        }
+        let mut depth = depths.get(at).copied().unwrap_or(0);
+        for (link, joint) in way.into_iter().rev() {
+            depth += usize::from(counts(joint));
+            depths.insert(link, depth);
+        }
+    }
+    depths
+}
+
 /// The links that are fixed to this one, those furthest from it first, itself last.
 fn rigid_with(joints: &BTreeMap<&str, Link<'_>>, link: &str) -> Vec<String> {
+    let mut fixed: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for (child, joint) in joints.iter().filter(|(_, joint)| !joint.moves) {
+        fixed.entry(joint.parent).or_default().push(child);
+    }
     let mut all = vec![(0, link)];
     let mut at = 0;
-    while let Some((depth, own)) = all.get(at).copied().filter(|_| all.len() <= joints.len() + 1) {
-        let fixed = joints.iter().filter(|(_, l)| l.parent == own && !l.moves);
-        all.extend(fixed.map(|(child, _)| (depth + 1, *child)));
+    // Each link has one joint here: only a loop comes by one again, and by this link.
+    while let Some((depth, own)) = all.get(at).copied() {
+        all.extend(fixed.remove(own).into_iter().flatten().map(|child| (depth + 1, child)));
         at += 1;
     }
     all.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(b.1)));

@@ -15,6 +15,8 @@ const FIRST: u64 = 100;
 const EVERY: u64 = 50;
 /// More names of joints or bodies than this are no arm in a laboratory.
 const MOST_NAMES: usize = 64;
+/// More types of messages than this that could hold joints, bodies or a temperature are no laboratory's.
+const MOST_TYPES: usize = 1000;
 
 /// A topic of joint readings.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,21 +102,24 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
         for channel in recording.channels() {
             let topic = own.entry(channel.topic.clone()).or_default();
             let Some(schema) = &channel.schema else { continue };
-            match role_of(schema, &channel.message_encoding) {
+            match plans.add(schema, &channel) {
                 Ok(role) => {
                     topic.role = topic.role.or(Some(role));
                     topic.thermometer |= role == Role::Scalar && is_thermometer(&channel);
-                    plans.add(role, channel);
                 }
                 Err(why) => {
                     topic.why_not = why;
-                    let own = fields.entry(channel.topic.clone());
-                    own.or_insert_with(|| Fields::of(schema, &channel.message_encoding)).next_recording();
+                    if let Some(known) = fields.get_mut(&channel.topic) {
+                        known.next_recording();
+                    } else if fields.len() < MOST_TYPES {
+                        let mut found = Fields::of(schema, &channel.message_encoding);
+                        found.next_recording();
+                        fields.extend((!found.is_empty()).then(|| (channel.topic.clone(), found)));
+                    }
                 }
             }
         }
-        let promising: BTreeSet<String> =
-            fields.iter().filter(|(_, f)| !f.is_empty()).map(|(topic, _)| topic.clone()).collect();
+        let promising: BTreeSet<String> = fields.keys().cloned().collect();
         let wanted = |c: &RawChannel| is_text(c) || promising.contains(&c.topic) || plans.of(c).is_some();
         let (urdfs, allowance) = (&mut channels.urdfs, recording.allowance());
         recording
@@ -174,24 +179,32 @@ pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
 #[derive(Default)]
 struct Plans {
     plans: Vec<Plan>,
-    /// Place of the plan of a schema with a message encoding.
-    schemas: HashMap<(Arc<RawSchema>, String), Option<usize>>,
+    /// Place of the plan of a schema with a message encoding, or why there is none.
+    schemas: HashMap<(Arc<RawSchema>, Arc<str>), Result<usize, String>>,
     channels: HashMap<Arc<RawChannel>, usize>,
 }
 
 impl Plans {
-    fn add(&mut self, role: Role, channel: Arc<RawChannel>) {
-        let Some(schema) = &channel.schema else { return };
+    /// The role of a channel of this schema.
+    ///
+    /// # Errors
+    /// Why it has none.
+    fn add(&mut self, schema: &Arc<RawSchema>, channel: &Arc<RawChannel>) -> Result<Role, String> {
         let encoding = &channel.message_encoding;
-        let key = (schema.clone(), encoding.clone());
         let plans = &mut self.plans;
-        let place = *self.schemas.entry(key).or_insert_with(|| {
-            let (name, data) = (&schema.name, &schema.data);
-            let plan = Plan::compile(role, name, &schema.encoding, data, encoding, None).ok()?;
-            plans.push(plan);
-            Some(plans.len() - 1)
-        });
-        self.channels.extend(place.map(|place| (channel, place)));
+        let compile = || {
+            let (name, language, data) = (&schema.name, &schema.encoding, &schema.data);
+            let role = readable_as(name, language, data, encoding).map_err(|e| e.to_string())?;
+            if plans.len() == MOST_TYPES {
+                return Err(format!("one of more than {MOST_TYPES} types of messages that could be read"));
+            }
+            let plan = Plan::compile(role, name, language, data, encoding, None);
+            plans.push(plan.map_err(|e| e.to_string())?);
+            Ok(plans.len() - 1)
+        };
+        let place = self.schemas.entry((schema.clone(), encoding.clone())).or_insert_with(compile).clone()?;
+        self.channels.insert(channel.clone(), place);
+        Ok(self.plans[place].role())
     }
 
     fn of(&self, channel: &RawChannel) -> Option<&Plan> {
@@ -241,13 +254,9 @@ impl Channels {
     }
 }
 
-fn role_of(schema: &RawSchema, message_encoding: &str) -> Result<Role, String> {
-    readable_as(&schema.name, &schema.encoding, &schema.data, message_encoding).map_err(|e| e.to_string())
-}
-
 /// The message type says it, or the topic does: a plain number may be anything.
 fn is_thermometer(channel: &RawChannel) -> bool {
-    let schema = channel.schema.as_ref().map_or("", |s| s.name.as_str());
+    let schema = channel.schema.as_ref().map_or("", |s| &*s.name);
     [schema, channel.topic.as_str()].iter().any(|name| name.to_lowercase().contains("temperature"))
 }
 
@@ -268,7 +277,7 @@ fn names_in(plan: &Plan, data: &[u8]) -> Vec<String> {
 /// `std_msgs/String`.
 fn is_text(channel: &RawChannel) -> bool {
     let schema = channel.schema.as_ref();
-    channel.message_encoding == "cdr"
+    *channel.message_encoding == *"cdr"
         && schema.is_some_and(|s| s.name.starts_with("std_msgs/") && s.name.ends_with("/String"))
 }
 

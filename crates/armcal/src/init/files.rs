@@ -7,7 +7,7 @@ use armcal_config::RecordingEntry;
 use armcal_recording::{Recording, is_recording, is_url, without_ending};
 use armcal_stages::RunError;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Parts of a split recording follow each other within this time.
 const NEXT_PART_NS: i64 = 5_000_000_000;
@@ -26,18 +26,23 @@ pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, Error> {
     inputs.iter().try_for_each(|input| refuse(Path::new(input)))?;
     let entries = Manifest::of(inputs, out)?.entries;
     let opened = entries.into_iter().map(open).collect::<Result<Vec<Opened>, Error>>()?;
-    let mut whole: Vec<Opened> = Vec::new();
+    let mut whole: Vec<Vec<Opened>> = Vec::new();
     for next in opened {
         match whole.last_mut() {
-            Some(before) if continues(before, &next) => {
-                let (name, _) = part(&before.entry.paths[0]).unwrap_or_default();
-                let paths = [before.entry.paths.as_slice(), &next.entry.paths].concat();
-                *before = open(RecordingEntry { name: Some(name), paths, ..next.entry })?;
-            }
-            _ => whole.push(next),
+            Some(parts) if parts.last().is_some_and(|before| continues(before, &next)) => parts.push(next),
+            _ => whole.push(vec![next]),
         }
     }
-    Ok(whole)
+    let joined = |mut parts: Vec<Opened>| match parts.len() {
+        1 => parts.pop().map(Ok),
+        _ => {
+            let paths: Vec<PathBuf> = parts.iter().flat_map(|part| part.entry.paths.clone()).collect();
+            let name = paths.first().and_then(|path| part(path)).map(|(name, _)| name);
+            // Opened once more, however many they are.
+            parts.pop().map(|last| open(RecordingEntry { name, paths, ..last.entry }))
+        }
+    };
+    whole.into_iter().filter_map(joined).collect()
 }
 
 fn open(entry: RecordingEntry) -> Result<Opened, Error> {

@@ -131,6 +131,8 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
     let used = |topic: &str| topic == arm.source.topic || read.bodies.iter().any(|b| b.topic == topic);
     left.retain(|(topic, _)| !used(topic));
     let mut proposal = known.propose(left)?;
+    // The trial opens them again.
+    drop((read, opened));
     progress.step("trying the proposal");
     proposal.tried = Some(tried(&proposal));
     progress.finish();

@@ -4,13 +4,14 @@
 //! How far the sockets are from each other is then what the calibration itself finds: the size at which it errs least.
 
 use super::arm::Arm;
-use super::read::AllRead;
+use super::read::{AllRead, Read};
 use crate::error::Error;
+use armcal_core::Pose;
 use armcal_core::robust::median;
 use armcal_stages::Inputs;
 use armcal_stages::links::rigid;
 use armcal_table::{Board, Cavity};
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 
 /// Heaps are this many times further apart than their pauses are from each other.
@@ -58,21 +59,14 @@ struct OnLink {
 /// Finds the sockets of recordings in which nothing but the joints was seen.
 pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, Error> {
     let mut found: Vec<OnLink> = Vec::new();
-    let links: Vec<Option<String>> = match arm.tips.is_empty() {
-        true => vec![None],
-        false => arm.tips.iter().cloned().map(Some).collect(),
-    };
-    for link in links {
-        let own = link.as_ref().map(|tip| arm.model_to(tip)).transpose()?;
-        let model = own.as_ref().unwrap_or(&arm.model);
-        let p = model.nominal();
-        let tips_m: Vec<Points> = read
-            .recordings
-            .iter()
-            .map(|r| {
-                r.dwells.iter().map(|d| model.tip_in_base(&p, &d.joint_rad).translation.vector).collect()
-            })
-            .collect();
+    let p = arm.model.nominal();
+    let in_pauses =
+        |r: &Read| r.dwells.iter().map(|d| arm.model.tip_in_base(&p, &d.joint_rad)).collect::<Vec<Pose>>();
+    let firsts: Vec<Vec<Pose>> = read.recordings.iter().map(in_pauses).collect();
+    for (link, place) in arm.tip_places()? {
+        let place = Point3::from(place.translation.vector);
+        let points = |firsts: &Vec<Pose>| firsts.iter().map(|first| (first * place).coords).collect();
+        let tips_m: Vec<Points> = firsts.iter().map(points).collect();
         let Some(heaps) = in_all(&tips_m.iter().map(|tips_m| heaps(tips_m)).collect::<Vec<_>>()) else {
             continue;
         };

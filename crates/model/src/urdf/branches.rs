@@ -18,6 +18,9 @@ pub(super) struct Branches<'a, 'x> {
     twice: BTreeSet<&'a str>,
     /// The joints below each link, in the order of the file.
     below: BTreeMap<&'a str, Vec<Node<'a, 'x>>>,
+    /// Links and joints by name, the first of each.
+    links: BTreeMap<&'a str, Node<'a, 'x>>,
+    joints: BTreeMap<&'a str, Node<'a, 'x>>,
 }
 
 /// A joint that is part of the model.
@@ -32,6 +35,7 @@ impl<'a, 'x> Branches<'a, 'x> {
     pub fn of(reader: &'a Reader<'a, 'x>, robot: Node<'a, 'x>) -> Branches<'a, 'x> {
         let (mut above, mut below) = (BTreeMap::new(), BTreeMap::<&str, Vec<_>>::new());
         let mut twice = BTreeSet::new();
+        let (links, joints) = (by_name(Reader::links(robot)), by_name(Reader::joints(robot)));
         for joint in Reader::joints(robot) {
             let [parent, link] =
                 ["parent", "child"].map(|end| child(joint, end).and_then(|e| e.attribute("link")));
@@ -43,7 +47,7 @@ impl<'a, 'x> Branches<'a, 'x> {
                 twice.extend(link);
             }
         }
-        Branches { reader, robot, above, twice, below }
+        Branches { reader, robot, above, twice, below, links, joints }
     }
 
     /// The joints on the ways from `base` to these links, and those whose readings they follow: parents before their
@@ -52,10 +56,9 @@ impl<'a, 'x> Branches<'a, 'x> {
         let mut kept: BTreeMap<&str, (Node<'a, 'x>, &'a str)> = BTreeMap::new();
         let mut wanted: Vec<String> = ends.iter().map(|end| (*end).to_owned()).collect();
         while let Some(end) = wanted.pop() {
-            for (joint, parent, link) in self.way(base, &end)? {
-                if kept.insert(link, (joint, parent)).is_none()
-                    && let Some((leader, _)) = self.followed(joint)?
-                {
+            for (joint, parent, link) in self.way(base, &end, |link| kept.contains_key(link))? {
+                kept.insert(link, (joint, parent));
+                if let Some((leader, _)) = self.followed(joint)? {
                     wanted.push(self.link_of(joint, leader)?.to_owned());
                 }
             }
@@ -73,12 +76,19 @@ impl<'a, 'x> Branches<'a, 'x> {
         Ok(order)
     }
 
-    /// The joints from `base` to a link, in this order, with the links above and below each.
-    fn way(&self, base: &str, end: &str) -> Result<Vec<(Node<'a, 'x>, &'a str, &'a str)>, ModelError> {
-        self.reader.check_link(self.robot, base)?;
-        self.reader.check_link(self.robot, end)?;
+    /// The joints from `base`, or from a link whose way is known, to a link, in this order, with the links above and below
+    /// each.
+    fn way(
+        &self,
+        base: &str,
+        end: &str,
+        is_known: impl Fn(&str) -> bool,
+    ) -> Result<Vec<(Node<'a, 'x>, &'a str, &'a str)>, ModelError> {
+        for link in [base, end].into_iter().filter(|link| !self.links.contains_key(link)) {
+            self.reader.check_link(self.robot, link)?;
+        }
         let (mut joints, mut ancestors, mut link) = (Vec::new(), Vec::new(), end);
-        while link != base {
+        while link != base && !is_known(link) {
             let Some((&own, &joint)) = self.above.get_key_value(link) else {
                 let ancestors = if ancestors.is_empty() { "none".to_owned() } else { ancestors.join(", ") };
                 let (base, tip, path) = (base.to_owned(), end.to_owned(), self.reader.path.to_owned());
@@ -126,9 +136,10 @@ impl<'a, 'x> Branches<'a, 'x> {
     /// The link that the joint of this name moves, which a joint follows.
     fn link_of(&self, follower: Node<'a, 'x>, leader: &str) -> Result<&'a str, ModelError> {
         let wrong = |problem: String| self.reader.error(follower, subject(follower), problem);
-        let joint = Reader::joints(self.robot).find(|joint| joint.attribute("name") == Some(leader));
-        let joint =
-            joint.ok_or_else(|| wrong(format!("it mimics \"{leader}\", and there is no such joint")))?;
+        let joint = *self
+            .joints
+            .get(leader)
+            .ok_or_else(|| wrong(format!("it mimics \"{leader}\", and there is no such joint")))?;
         if child(joint, "mimic").is_some() {
             return Err(wrong(format!(
                 "it mimics \"{leader}\", which mimics another joint itself; name the joint that has a reading"
@@ -142,7 +153,7 @@ impl<'a, 'x> Branches<'a, 'x> {
     }
 
     /// What hangs on a link by joints that are not part of the model, in its frame: with each as near to zero as its limits
-    /// let it be. A branch that cannot be read weighs nothing.
+    /// let it be. A branch that cannot be read weighs nothing, and one that hangs on two joints is none.
     pub fn hanging(&self, link: &str, kept: &BTreeSet<&str>) -> Option<Body> {
         let mut all: Option<Body> = None;
         let mut open = vec![(link, Rigid::identity())];
@@ -150,12 +161,12 @@ impl<'a, 'x> Branches<'a, 'x> {
         while let Some((link, at)) = open.pop() {
             for &joint in self.below.get(link).into_iter().flatten() {
                 let Some(end) = child(joint, "child").and_then(|c| c.attribute("link")) else { continue };
-                if kept.contains(end) || !seen.insert(end) {
+                if kept.contains(end) || self.twice.contains(end) || !seen.insert(end) {
                     continue;
                 }
                 let Ok(place) = self.at_rest(joint) else { continue };
                 let place = at.then(&place);
-                if let Ok(Some(body)) = self.reader.body(self.robot, end) {
+                if let Ok(Some(body)) = self.body(end) {
                     let body = Body { centre_m: place.point(&body.centre_m), ..body };
                     all.get_or_insert(Body::NONE).add(&body);
                 }
@@ -163,6 +174,11 @@ impl<'a, 'x> Branches<'a, 'x> {
             }
         }
         all
+    }
+
+    /// Mass and centre of a link; none where it has none, or none that weighs.
+    pub fn body(&self, link: &str) -> Result<Option<Body>, ModelError> {
+        self.links.get(link).map_or(Ok(None), |node| self.reader.body(*node, link))
     }
 
     /// Where a joint puts its link when it is as near to zero as its limits let it be.
@@ -174,6 +190,19 @@ impl<'a, 'x> Branches<'a, 'x> {
         let Some(motion) = motion else { return Ok(origin) };
         Ok(origin.then(&moved(&self.reader.axis(joint, &subject)?, value, motion)))
     }
+}
+
+/// Elements by their names, the first of each.
+pub(super) fn by_name<'a, 'x>(
+    elements: impl Iterator<Item = Node<'a, 'x>>,
+) -> BTreeMap<&'a str, Node<'a, 'x>> {
+    let mut named = BTreeMap::new();
+    for element in elements {
+        if let Some(name) = element.attribute("name") {
+            named.entry(name).or_insert(element);
+        }
+    }
+    named
 }
 
 /// A joint as errors name it.

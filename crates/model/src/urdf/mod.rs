@@ -147,7 +147,7 @@ impl<'a> Built<'a> {
             return Err(reader.error(joint, subject, problem));
         }
         let nominal = reader.origin(joint, &subject)?;
-        let body = reader.body(reader.robot()?, link)?;
+        let body = branches.body(link)?;
         self.sources.push(UrdfJoint {
             name: name.to_owned(),
             segment: self.segments.len(),
@@ -200,10 +200,12 @@ impl<'a> Built<'a> {
     }
 
     fn chain(mut self, name: String, end: Option<SegmentId>) -> Chain {
+        // The first of a name, as everywhere.
+        let names = self.joint_names.iter().enumerate().rev();
+        let places: BTreeMap<&str, usize> = names.map(|(index, name)| (name.as_str(), index)).collect();
         for (segment, leader) in &self.following {
-            let index = self.joint_names.iter().position(|name| name == leader);
-            if let (Some(joint), Some(index)) = (&mut self.segments[*segment].joint, index) {
-                joint.index = index;
+            if let (Some(joint), Some(index)) = (&mut self.segments[*segment].joint, places.get(leader)) {
+                joint.index = *index;
             }
         }
         Chain {

@@ -64,11 +64,8 @@ impl<'a, 'x> Reader<'a, 'x> {
         ))
     }
 
-    /// Mass and centre of `<inertial>`; none where a link has none, or none that weighs.
-    pub fn body(&self, robot: Node<'a, 'x>, link: &str) -> Result<Option<Body>, ModelError> {
-        let Some(node) = Self::links(robot).find(|node| node.attribute("name") == Some(link)) else {
-            return Ok(None);
-        };
+    /// Mass and centre of `<inertial>` of a link; none where it has none, or none that weighs.
+    pub fn body(&self, node: Node<'a, 'x>, link: &str) -> Result<Option<Body>, ModelError> {
         let Some(inertial) = child(node, "inertial") else { return Ok(None) };
         let mass = child(inertial, "mass").and_then(|mass| mass.attribute("value"));
         let mass_kg = mass.and_then(|value| value.trim().parse::<f64>().ok()).unwrap_or(0.0);

@@ -1,5 +1,6 @@
 //! Writing a calibrated chain back into its URDF: only the numbers that changed are replaced.
 
+use super::branches::by_name;
 use super::reader::{Reader, child, parse};
 use crate::chain::Source;
 use crate::{Model, ModelError};
@@ -50,10 +51,10 @@ impl Model {
         let document = parse(xml, path)?;
         let reader = Reader { document: &document, path };
         let robot = reader.robot()?;
-        let mut edits = Vec::new();
+        let (joints, mut edits) = (by_name(Reader::joints(robot)), Vec::new());
         for (name, new) in origins {
-            let node = Reader::joints(robot)
-                .find(|node| node.attribute("name") == Some(name))
+            let node = *joints
+                .get(name)
                 .ok_or_else(|| ModelError::ForeignUrdf { path: path.to_owned(), joint: name.to_owned() })?;
             let old = reader.origin(node, &format!("joint \"{name}\""))?;
             edits.extend(origin_edits(node, &old, &new, xml));

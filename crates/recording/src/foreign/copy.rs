@@ -7,7 +7,7 @@ use crate::budget::Allowance;
 use crate::damage::{Damage, Faults};
 use crate::map::Map;
 use mcap::records::MessageHeader;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
@@ -60,13 +60,12 @@ impl Copy {
         topic: &str,
         schema: Option<(&str, &str, &[u8])>,
         encoding: &str,
-        metadata: &BTreeMap<String, String>,
     ) -> Result<u16, RecordingError> {
         let schema = match schema {
             Some((name, encoding, data)) => self.writer.add_schema(name, encoding, data),
             None => Ok(0),
         };
-        let id = schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, metadata));
+        let id = schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, &BTreeMap::new()));
         id.map_err(|e| failed(&self.path, e))
     }
 
@@ -93,7 +92,7 @@ impl Copy {
     }
 
     /// The finished file, mapped.
-    pub fn finish(mut self, log: String) -> Result<Converted, RecordingError> {
+    pub fn finish(mut self, log: String, known_here: BTreeSet<String>) -> Result<Converted, RecordingError> {
         if let Some((messages, why)) = self.broken.take() {
             self.lost(format!("{messages} compressed messages cannot be used, the first because {why}"));
         }
@@ -104,7 +103,7 @@ impl Copy {
         // The identity is that of the original.
         map.hashed = None;
         let damage: Vec<Damage> = faults.in_words();
-        Ok(Converted { map, damage, log, packed: false })
+        Ok(Converted { map, damage, log, known_here: Some(known_here) })
     }
 }
 

@@ -29,6 +29,7 @@ use crate::damage::Damage;
 use crate::map::Map;
 use crate::{RecordingError, url};
 use copy::{Copy, no_room};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Read as _, Write as _};
 use std::path::Path;
@@ -41,8 +42,8 @@ pub(crate) struct Converted {
     pub damage: Vec<Damage>,
     /// Identity of the log that was read with it.
     pub log: String,
-    /// Whether the file was in the original as it is, and not made here.
-    pub packed: bool,
+    /// Of a database: the types whose definitions are not its own. None where the file was in the original as it is.
+    pub known_here: Option<BTreeSet<String>>,
 }
 
 /// What a file is, by its first bytes.
@@ -113,7 +114,7 @@ fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, 
             let mut map = Map::of(named.as_file()).map_err(no_room(path))?;
             // The identity is that of the original.
             map.hashed = None;
-            Ok(Converted { map, damage, log: String::new(), packed: true })
+            Ok(Converted { map, damage, log: String::new(), known_here: None })
         }
         Some(Kind::Database) => {
             let mut converted = database(named.path(), path, allowance)?;
@@ -132,6 +133,6 @@ fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, 
 /// The messages of the rosbag2 database `file`, which is or was made of `path`.
 fn database(file: &Path, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
     let mut copy = Copy::create(path)?;
-    let log = rosbag2::read(file, &mut copy, allowance)?;
-    copy.finish(log)
+    let (log, known_here) = rosbag2::read(file, &mut copy, allowance)?;
+    copy.finish(log, known_here)
 }

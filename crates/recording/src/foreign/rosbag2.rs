@@ -4,16 +4,18 @@
 //! immutable, so that SQLite makes neither a journal nor a lock. Where a recorder that died left a write-ahead log or
 //! a journal, both are copied, and the copy is opened.
 
-use super::copy::{Copy, DEFINITION_FROM, no_room};
+use super::copy::{Copy, no_room};
 use super::database::{Stored, compare_index, compare_log, compare_rows, failed, is_of_disk, quick_check};
 use super::definitions;
 use super::wal::{Frames, beside, frames, identity, logs_of};
 use crate::budget::Allowance;
+use crate::channels::MOST_BYTES as MOST_DEFINITION_BYTES;
 use crate::{RecordingError, input};
 use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Error, ErrorCode, OpenFlags};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -22,8 +24,13 @@ use std::path::{Path, PathBuf};
 const MAX_VALUE_BYTES: u64 = 1 << 30;
 const LEAST_VALUE_BYTES: u64 = 1 << 20;
 
-/// Copies the messages of a database; returns the identity of the log that was read with it.
-pub(super) fn read(file: &Path, copy: &mut Copy, allowance: &Allowance) -> Result<String, RecordingError> {
+/// Copies the messages of a database; returns the identity of the log that was read with it, and the types whose definitions
+/// are not its own.
+pub(super) fn read(
+    file: &Path,
+    copy: &mut Copy,
+    allowance: &Allowance,
+) -> Result<(String, BTreeSet<String>), RecordingError> {
     let refused = |path: &Path, why: String| RecordingError::Foreign { path: path.to_owned(), why };
     let with_pending = pending(file)?;
     let opened = match &with_pending {
@@ -75,11 +82,11 @@ pub(super) fn read(file: &Path, copy: &mut Copy, allowance: &Allowance) -> Resul
         None => String::new(),
     };
     quick_check(&database, copy)?;
-    let topics = add_topics(&database, &tables, copy)?;
+    let (topics, known_here) = add_topics(&database, &tables, copy)?;
     let stored = copy_messages(&database, &topics, copy, (bytes, allowance))?;
     compare_rows(&stored, copy);
     compare_index(&database, &stored, copy)?;
-    Ok(log)
+    Ok((log, known_here))
 }
 
 /// Nothing in a database is trusted: no functions in its schema, no values longer than the file.
@@ -101,51 +108,72 @@ fn tables(database: &Connection) -> rusqlite::Result<BTreeSet<String>> {
     statement.query_map([], |row| row.get(0))?.collect()
 }
 
-/// Adds a channel for each topic; returns them by the numbers that the database gives them.
+/// Adds a channel for each topic; returns them by the numbers that the database gives them, and the types that it does not
+/// define.
 fn add_topics(
     database: &Connection,
     tables: &BTreeSet<String>,
     copy: &mut Copy,
-) -> Result<BTreeMap<i64, u16>, RecordingError> {
-    let damaged = |e: Error, path: &Path| match is_of_disk(&e) {
-        true => failed(path, e),
-        false => RecordingError::Foreign {
-            path: path.to_owned(),
-            why: format!("its topics cannot be read ({e}); `sqlite3 IN .recover | sqlite3 OUT` may save it"),
-        },
-    };
-    let of_bag = match tables.contains("message_definitions") {
-        true => stored_definitions(database),
-        false => Ok(BTreeMap::new()),
-    };
-    let of_bag = of_bag.map_err(|e| damaged(e, copy.path()))?;
-    let topics = || {
+) -> Result<(BTreeMap<i64, u16>, BTreeSet<String>), RecordingError> {
+    let path = copy.path().to_owned();
+    let (mut channels, mut known_here, mut bytes) = (BTreeMap::new(), BTreeSet::new(), 0);
+    let mut topics = || -> Result<(), Stop> {
+        let of_bag = match tables.contains("message_definitions") {
+            true => stored_definitions(database)?,
+            false => BTreeMap::new(),
+        };
         let mut statement =
             database.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id")?;
-        let topic = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
-        statement.query_map([], topic)?.collect::<rusqlite::Result<Vec<(i64, String, String, String)>>>()
+        let mut rows = statement.query([])?;
+        while let Some(row) = rows.next()? {
+            let (id, name, kind, format): (i64, String, String, String) =
+                (row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?);
+            bytes += name.len() + kind.len() + format.len();
+            if bytes > MOST_DEFINITION_BYTES {
+                return Err(Stop::Endless);
+            }
+            let stored = of_bag.get(&kind).map(|(encoding, text)| (encoding.as_str(), text.as_str().into()));
+            let readable = stored.as_ref().is_some_and(|(encoding, _)| *encoding == "ros2msg");
+            let known = if readable { None } else { definitions::of(&kind) };
+            if known.is_some() {
+                known_here.insert(kind.clone());
+            }
+            let definition = known.map(|text| ("ros2msg", Cow::from(text))).or(stored);
+            let (encoding, text) = definition.unwrap_or_default();
+            let added = copy.add_channel(&name, Some((&kind, encoding, text.as_bytes())), &format);
+            channels.insert(id, added.map_err(Stop::Failed)?);
+        }
+        Ok(())
     };
-    let topics = topics().map_err(|e| damaged(e, copy.path()))?;
-    let mut channels = BTreeMap::new();
-    for (id, name, kind, format) in topics {
-        let stored = of_bag.get(&kind).map(|(encoding, text)| ("bag", encoding.clone(), text.clone()));
-        let known = || definitions::of(&kind).map(|text| ("armcal", "ros2msg".to_owned(), text));
-        let readable = stored.as_ref().is_some_and(|(_, encoding, _)| encoding == "ros2msg");
-        let definition = if readable { stored } else { known().or(stored) };
-        let from = definition.as_ref().map(|(from, ..)| (DEFINITION_FROM.to_owned(), (*from).to_owned()));
-        let (encoding, text) = definition.map_or_else(Default::default, |(_, e, t)| (e, t));
-        let schema = (kind.as_str(), encoding.as_str(), text.as_bytes());
-        let metadata = from.into_iter().collect();
-        channels.insert(id, copy.add_channel(&name, Some(schema), &format, &metadata)?);
+    let refused = |why: String| Err(RecordingError::Foreign { path: path.clone(), why });
+    match topics() {
+        Ok(()) => Ok((channels, known_here)),
+        Err(Stop::Failed(e)) => Err(e),
+        Err(Stop::Damaged(e)) if is_of_disk(&e) => Err(failed(&path, e)),
+        Err(Stop::Damaged(e)) => refused(format!(
+            "its topics cannot be read ({e}); `sqlite3 IN .recover | sqlite3 OUT` may save it"
+        )),
+        Err(Stop::Endless) => refused(format!(
+            "its topics and message definitions take more than the {MOST_DEFINITION_BYTES} bytes that they may"
+        )),
     }
-    Ok(channels)
 }
 
 /// Encoding and text of each message type.
-fn stored_definitions(database: &Connection) -> rusqlite::Result<BTreeMap<String, (String, String)>> {
+fn stored_definitions(database: &Connection) -> Result<BTreeMap<String, (String, String)>, Stop> {
     let mut statement = database
         .prepare("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")?;
-    statement.query_map([], |row| Ok((row.get(0)?, (row.get(1)?, row.get(2)?))))?.collect()
+    let (mut all, mut bytes) = (BTreeMap::new(), 0);
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let (kind, encoding, text): (String, String, String) = (row.get(0)?, row.get(1)?, row.get(2)?);
+        bytes += kind.len() + encoding.len() + text.len();
+        if bytes > MOST_DEFINITION_BYTES {
+            return Err(Stop::Endless);
+        }
+        all.insert(kind, (encoding, text));
+    }
+    Ok(all)
 }
 
 /// Copies message after message in the order in which they are stored, as long as they are no more than the database holds:
@@ -200,10 +228,10 @@ fn copy_messages(
     Ok(stored)
 }
 
-/// Why a pass over the messages ended early.
+/// Why a pass over rows ended early.
 enum Stop {
     Damaged(Error),
-    /// More rows than there are bytes for.
+    /// More than there are bytes for, or than may be.
     Endless,
     Failed(RecordingError),
 }

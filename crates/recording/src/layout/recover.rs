@@ -68,10 +68,11 @@ impl Layout {
             self.faults.lost(at, || "the file is cut off here".to_owned());
             if bytes.get(at) == Some(&op::CHUNK) && bytes.len() > at + ENVELOPE {
                 self.chunks += 1;
-                if let Some((header, packed)) = ChunkHeader::parse(&bytes[at + ENVELOPE..]) {
-                    self.admitted(walk.allowance, at, &header, packed.len());
-                }
-                self.blocks.push(Block::of(at, Content::CutChunk(at + ENVELOPE..bytes.len())));
+                let header = ChunkHeader::parse(&bytes[at + ENVELOPE..]);
+                let claim = header
+                    .map_or(0, |(header, packed)| self.admitted(walk.allowance, at, &header, packed.len()));
+                let content = Content::CutChunk(at + ENVELOPE..bytes.len());
+                self.blocks.push(Block { claim, ..Block::of(at, content) });
             }
         }
     }

@@ -182,10 +182,9 @@ impl Layout {
     /// Takes in a chunk by its place alone.
     pub(super) fn take_indexed(&mut self, walk: &Walk<'_>, offset: usize, range: Range<usize>) {
         self.chunks += 1;
-        if let Some((header, packed)) = ChunkHeader::parse(&walk.bytes[range.clone()]) {
-            self.admitted(walk.allowance, offset, &header, packed.len());
-        }
-        self.blocks.push(Block::chunk(offset, range));
+        let claim = ChunkHeader::parse(&walk.bytes[range.clone()])
+            .map_or(0, |(header, packed)| self.admitted(walk.allowance, offset, &header, packed.len()));
+        self.blocks.push(Block::chunk(offset, range, claim));
     }
 
     fn compare_extras(&mut self, index: &Index) {
@@ -217,7 +216,7 @@ impl Layout {
         let statistics = self.statistics.as_ref();
         let mut used = index.channels.clone();
         used.extend(statistics.iter().flat_map(|s| s.channel_message_counts.keys().copied()));
-        let known = !used.is_empty() && used.iter().all(|id| self.definitions.contains(*id));
+        let known = !used.is_empty() && used.iter().all(|id| self.definitions.channel(*id).is_some());
         let empty = statistics.is_some_and(|s| s.message_count == 0);
         let by_index = chunked && (known || empty) && index.listed >= self.chunks;
         self.definitions_complete = !chunked || by_index;

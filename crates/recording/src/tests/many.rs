@@ -41,7 +41,7 @@ fn each_of_many_channels_has_its_own_messages_mapped_and_by_ranges() {
         recording.for_each_raw_of(&|c| c.topic == "/t2", &mut |_| Ok(())).expect("a pass");
         let report = recording.report();
         assert_eq!(report.channels.len(), usize::from(CHANNELS));
-        for c in &report.channels {
+        for c in report.channels.iter() {
             let number: u64 = c.topic[2..].parse().expect("a number");
             assert_eq!(c.messages, 2 * (number % 3), "{} by {access:?}", c.topic);
         }

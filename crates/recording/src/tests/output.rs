@@ -11,8 +11,7 @@ fn copy(recording: &Recording, path: &Path) -> Result<(), RecordingError> {
     let mut out = McapOutput::create(path, "ros2")?;
     let none = BTreeMap::new();
     recording.for_each_raw(&mut |m| {
-        let schema =
-            m.channel.schema.as_ref().map(|s| (s.name.as_str(), s.encoding.as_str(), s.data.as_slice()));
+        let schema = m.channel.schema.as_ref().map(|s| (&*s.name, &*s.encoding, s.data.as_slice()));
         let id = out.add_channel(&m.channel.topic, schema, &m.channel.message_encoding, &none)?;
         out.put(id, m.sequence, m.log_ns, m.publish_ns, m.data)
     })?;
