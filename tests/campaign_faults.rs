@@ -123,15 +123,15 @@ fn threads_that_the_system_refuses_cost_nothing_as_long_as_there_is_one() {
     };
     let batch = ["batch", "lab/*.mcap", "--pipeline", "p.toml", "--out"];
     world.done(&[&batch[..], &["all"]].concat());
-    let refusals = (0..8).map(|n| format!("pthread_create:{n}"));
-    for fail in refusals.chain((1..4).map(|n| format!("pthread_create:{n}-"))) {
+    let refusals = (0..8).map(|n| format!("thread:{n}"));
+    for fail in refusals.chain((1..4).map(|n| format!("thread:{n}-"))) {
         let output = with(&fail, &[&batch[..], &[&fail]].concat());
         assert!(output.status.code() == Some(0), "{fail}: {}", complaint(&output));
         assert!(made(&world, &fail) == made(&world, "all"), "{fail} has another result");
         let output = with(&fail, &["run", "p.toml", "--out", "run"]);
         assert!(matches!(output.status.code(), Some(0 | 3)), "{fail}: {}", complaint(&output));
     }
-    let output = with("pthread_create:0-", &["run", "p.toml", "--out", "none"]);
+    let output = with("thread:0-", &["run", "p.toml", "--out", "none"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(complaint(&output).contains("starting worker threads"), "{}", complaint(&output));
 }

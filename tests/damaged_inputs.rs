@@ -77,7 +77,7 @@ fn chunks(sound: &[u8]) -> Vec<usize> {
 }
 
 /// The messages as rosbag2 stores them. What a file is decides, and not what it is called.
-fn as_bag(sound: &[u8], path: &Path) -> Connection {
+pub fn as_bag(sound: &[u8], path: &Path) -> Connection {
     let database = Connection::open(path).expect("a database");
     let tables = "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, \
                   serialization_format TEXT NOT NULL); \

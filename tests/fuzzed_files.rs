@@ -1,10 +1,19 @@
-//! Replays what fuzzing of pipelines, models, boards and results found (docs/hardening.md), and damages the shipped ones.
+//! Replays the corpora of fuzzing pipelines, models, boards and results, and what it found (docs/hardening.md), and damages the
+//! shipped ones.
 
 #[path = "../crates/recording/fuzz/src/files.rs"]
 mod files;
+#[path = "../crates/recording/fuzz/src/limits.rs"]
+mod limits;
+#[path = "../crates/recording/fuzz/src/memory.rs"]
+mod memory;
 
 use crate::support::root;
+use limits::{Size, held};
 use std::path::{Path, PathBuf};
+
+#[global_allocator]
+static COUNTING: memory::Counting = memory::Counting;
 
 type Target = fn(&[u8]);
 const TARGETS: [(&str, Target); 3] =
@@ -19,11 +28,15 @@ fn files_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn findings_of_fuzzing_stay_mended() {
+fn corpora_and_findings_of_fuzzing_keep_to_the_limits() {
     for (name, target) in TARGETS {
-        for path in files_in(&root().join("crates/recording/fuzz/regressions").join(name)) {
+        let folders = ["corpus", "regressions"].map(|kind| format!("crates/recording/fuzz/{kind}/{name}"));
+        let files: Vec<PathBuf> = folders.iter().flat_map(|folder| files_in(&root().join(folder))).collect();
+        assert!(files.len() > 10, "{name} has no corpus");
+        for path in files {
             println!("{}", path.display());
-            target(&std::fs::read(path).expect("a finding"));
+            let bytes = std::fs::read(&path).expect("readable");
+            held(Size::plain(&bytes), || target(&bytes));
         }
     }
 }

@@ -50,6 +50,10 @@ mod corrupt_recordings;
 /// Are results whole whatever happens to the disk, the folder or the process?
 mod write_faults;
 
+/// Is every call that the system refuses a command harmless, or reported with the file that it was about?
+#[cfg(target_os = "linux")]
+mod fault_sweep;
+
 /// Is nothing written over that a command was given, or that armcal did not make?
 mod sacred_inputs;
 

@@ -35,7 +35,7 @@ impl Server {
         let text = paper_pipeline(&root().join("fixtures/paper")) + "\n[diagnosis]\nenabled = false\n";
         std::fs::write(&pipeline, text).expect("a pipeline");
         let mut child = Command::new("sh")
-            .args(["-c", &format!("ulimit -n {open_files}; exec \"$0\" view \"$1\"")])
+            .args(["-c", &format!("ulimit -n {open_files}; LD_PRELOAD=$PRELOAD exec \"$0\" view \"$1\"")])
             .args([env!("CARGO_BIN_EXE_armcal").as_ref(), pipeline.as_os_str()])
             .envs(environment.iter().copied())
             .stdout(Stdio::piped())
@@ -148,8 +148,8 @@ fn a_connection_that_the_system_does_not_give_is_not_the_last() {
     let folder = tempfile::tempdir().expect("a folder");
     let Some(library) = failing_calls(&folder.path().join("fail.so")) else { return };
     let library = library.to_str().expect("a name");
-    for fail in ["accept4:0", "accept4:1", "accept4:2", "pthread_create:3-"] {
-        let server = Server::with(256, &[("LD_PRELOAD", library), ("FAIL", fail)]);
+    for fail in ["accept:0", "accept:1", "accept:2", "thread:3-"] {
+        let server = Server::with(256, &[("PRELOAD", library), ("FAIL", fail)]);
         for round in 0..4 {
             let page = server.answer("", "");
             assert!(page.starts_with("HTTP/1.1 200"), "{fail}, {round}: {page}");

@@ -138,20 +138,22 @@ pub fn run(
     config.check()?;
     let rig = Rig::build(config, base_dir)?;
     // Recordings have random streams of their own, so the threads cannot disturb each other.
+    let simulate = |recording| {
+        let hidden = hidden_in(config).chain(mechanisms(recording)).collect();
+        one(config, &rig, recording, hidden)
+    };
     let made: Vec<Result<(RecordingTruth, Log), LabError>> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..config.recordings.len())
-            .map(|recording| {
-                let rig = &rig;
-                scope.spawn(move || {
-                    let hidden = hidden_in(config).chain(mechanisms(recording)).collect();
-                    one(config, rig, recording, hidden)
-                })
-            })
-            .collect();
-        threads
-            .into_iter()
-            .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .collect()
+        let start = |recording| {
+            let thread = std::thread::Builder::new().spawn_scoped(scope, move || simulate(recording));
+            // Where the system refuses a thread, this one does its work.
+            thread.map_err(|_| recording)
+        };
+        let threads: Vec<_> = (0..config.recordings.len()).map(start).collect();
+        let end = |thread: Result<std::thread::ScopedJoinHandle<'_, _>, usize>| match thread {
+            Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            Err(recording) => simulate(recording),
+        };
+        threads.into_iter().map(end).collect()
     });
     let (mut truth, mut logs) = (Truth::of_rig(config, &rig), Vec::new());
     for result in made {

@@ -79,6 +79,12 @@ pub(crate) fn find_within(file: &Ranged, allowance: &Allowance) -> Result<Found,
     let data = summary_start - DATA_END_BYTES;
     let layout = Summary::parse(&summary[..end - summary_start])
         .and_then(|summary| summary.layout(&head, data, allowance));
+    // A chunk has a CRC of its own. A local file is hashed, an object is read whole only where it is copied.
+    if crc.is_some() && file.object.is_some() && layout.as_ref().is_ok_and(|layout| layout.chunks == 0) {
+        return Ok(Found::Unusable(
+            "its messages are in no chunk, so that only the CRC of all data covers them",
+        ));
+    }
     let layout =
         layout.map(|layout| Layout { data_crc: crc.map(|crc| DataCrc { end: data, crc }), ..layout });
     Ok(layout.map_or_else(Found::Unusable, |layout| Found::Layout(Box::new(layout))))

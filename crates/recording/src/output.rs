@@ -5,6 +5,7 @@ use crate::atomic::AtomicFile;
 use mcap::records::{MessageHeader, Metadata};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::error::Error as _;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +47,7 @@ impl McapOutput {
             .chunk_size(Some(CHUNK_BYTES));
         match options.create(BufWriter::new(file)) {
             Ok(writer) => Ok(McapOutput { writer, path: path.to_owned() }),
-            Err(e) => Err(RecordingError::Write { path: path.to_owned(), why: e.to_string() }),
+            Err(e) => Err(failed(path, &e)),
         }
     }
 
@@ -119,10 +120,12 @@ impl McapOutput {
     }
 
     fn failed(&self, error: &mcap::McapError) -> RecordingError {
-        let why = match error {
-            mcap::McapError::Io(e) => e.to_string(),
-            other => other.to_string(),
-        };
-        RecordingError::Write { path: self.path.clone(), why }
+        failed(&self.path, error)
     }
+}
+
+/// What the system refused is the cause of a refusal to write: a full disk is "Record parse failed" to the library.
+fn failed(path: &Path, error: &mcap::McapError) -> RecordingError {
+    let why = error.source().map_or_else(|| error.to_string(), ToString::to_string);
+    RecordingError::Write { path: path.to_owned(), why }
 }

@@ -1,22 +1,17 @@
 //! Recordings made to do harm: whatever they claim, no more is allocated than their bytes could hold, and nothing takes
-//! forever. Also replays what fuzzing found (docs/hardening.md).
+//! forever.
 
 #[path = "../fuzz/src/memory.rs"]
 mod memory;
 #[path = "../fuzz/src/recordings.rs"]
 mod recordings;
-#[path = "../fuzz/src/structured.rs"]
-mod structured;
 
 use armcal_recording::Recording;
 use armcal_recording::decode::{Plan, Role, Rows, readable_as};
 use memory::peak_bytes;
-use std::sync::Mutex;
 
 #[global_allocator]
 static COUNTING: memory::Counting = memory::Counting;
-/// The allocator counts for the whole process: one test at a time.
-static ALONE: Mutex<()> = Mutex::new(());
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const SCHEMA: u8 = 0x03;
@@ -26,11 +21,7 @@ const CHUNK: u8 = 0x06;
 const ATTACHMENT: u8 = 0x09;
 const METADATA: u8 = 0x0c;
 
-fn alone() -> std::sync::MutexGuard<'static, ()> {
-    ALONE.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
-/// Runs on one thread, and checks what was allocated at once. The caller is [`alone`].
+/// Runs on one thread, and checks what was allocated at once.
 fn measured<R: Send>(what: &str, most_bytes: usize, f: impl FnOnce() -> R + Send) -> R {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let (result, peak) = pool.install(|| peak_bytes(f));
@@ -63,7 +54,6 @@ fn chunk(compression: &[u8], size: u64, packed: &[u8]) -> Vec<u8> {
 
 #[test]
 fn lengths_that_lie_reserve_nothing() {
-    let _alone = alone();
     let huge = u32::MAX.to_le_bytes();
     let id = [1, 0];
     let schema =
@@ -104,7 +94,6 @@ fn lengths_that_lie_reserve_nothing() {
 /// 64 MiB of zeros in 2 KiB are honest for the codec, but nothing that a recorder writes.
 #[test]
 fn a_bomb_is_refused_by_what_the_file_may_inflate_to() {
-    let _alone = alone();
     let bomb = zstd::bulk::compress(&vec![0; 64 << 20], 3).expect("compresses");
     let report = |bytes: &[u8]| {
         recordings::on_disk(bytes, |path| Recording::open(&[path.to_owned()]).map(|r| r.report().clone()))
@@ -133,7 +122,6 @@ fn a_bomb_is_refused_by_what_the_file_may_inflate_to() {
 /// Messages that are compressed one by one, in a chunk that is compressed: the sum of all is what counts.
 #[test]
 fn messages_that_are_bombs_end_the_pass() {
-    let _alone = alone();
     let schema = "string[] name\nfloat64[] position\n";
     let definitions = [
         record(SCHEMA, &[&[1, 0][..], &text(b"a/J"), &text(b"ros2msg"), &text(schema.as_bytes())].concat()),
@@ -188,7 +176,6 @@ fn passes_over_a_recording_are_limited_together() {
 /// What is remembered of a file does not grow with its records: ten times as many take no more.
 #[test]
 fn records_that_say_nothing_take_no_memory_each() {
-    let _alone = alone();
     let empty = |op: u8| record(op, b"");
     let sound = chunk(b"", 0, b"");
     let broken = chunk(b"zstd", 100, b"abc");
@@ -298,7 +285,6 @@ fn definitions_in_chunks_are_held_once_and_to_their_limit() {
 
 #[test]
 fn a_million_faults_are_counted_and_not_listed() {
-    let _alone = alone();
     let short = record(MESSAGE, b"").repeat(300_000);
     let packed = zstd::bulk::compress(&short, 3).expect("compresses");
     let bad = record(ATTACHMENT, b"").repeat(10_000);
@@ -319,7 +305,6 @@ fn a_million_faults_are_counted_and_not_listed() {
 /// Many entries of an index that lead into the same bytes must not multiply what is read.
 #[test]
 fn chunks_that_overlap_are_read_once() {
-    let _alone = alone();
     let schema = record(SCHEMA, &[&[1, 0][..], &text(b"a/b"), &text(b"ros2msg"), &text(b"bool x")].concat());
     let channel = record(CHANNEL, &[&[0, 0, 1, 0][..], &text(b"/a"), &text(b"cdr"), &text(b"")].concat());
     let records = [schema, channel, record(MESSAGE, &[0; 22 + 5])].concat();
@@ -354,7 +339,6 @@ fn chunks_that_overlap_are_read_once() {
 /// 5^30 messages without bytes, in a schema of a few kilobytes.
 #[test]
 fn messages_without_bytes_nest_without_end() {
-    let _alone = alone();
     let separator = "=".repeat(80);
     let nested = |leaf: &str| {
         let mut schema: String = (0..5).map(|i| format!("m/L0 z{i}\n")).collect();
@@ -384,7 +368,6 @@ fn messages_without_bytes_nest_without_end() {
 /// The full name of each nested message repeats those around it.
 #[test]
 fn long_names_around_many_messages_stay_small() {
-    let _alone = alone();
     let nested = |tag: u8, bytes: &[u8]| {
         let mut field = vec![tag << 3 | 2];
         let mut length = bytes.len();
@@ -405,7 +388,6 @@ fn long_names_around_many_messages_stay_small() {
 
 #[test]
 fn a_topic_of_megabytes_is_neither_compared_nor_shown_whole() {
-    let _alone = alone();
     let long = vec![b'j'; 4 << 20];
     let channel = record(CHANNEL, &[&[0; 4][..], &text(&long), &text(b"cdr"), &text(b"")].concat());
     let bytes = file(&[channel]);
@@ -428,7 +410,6 @@ fn a_topic_of_megabytes_is_neither_compared_nor_shown_whole() {
 /// A message with very many bodies: naming them takes time in proportion.
 #[test]
 fn very_many_bodies_are_told_in_part() {
-    let _alone = alone();
     let schema = "m/Body[] markers\n===\nMSG: m/Body\nstring marker_name\nm/Point translation\n===\nMSG: m/Point\n\
                   float64 x\nfloat64 y\nfloat64 z";
     let plan =
@@ -445,7 +426,6 @@ fn very_many_bodies_are_told_in_part() {
 
 #[test]
 fn a_pipe_is_refused_and_not_waited_for() {
-    let _alone = alone();
     let folder = tempfile::tempdir().expect("a folder");
     let pipe = folder.path().join("pipe.mcap");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status();
@@ -453,36 +433,4 @@ fn a_pipe_is_refused_and_not_waited_for() {
     let refused = Recording::open(&[pipe]).err().map(|e| e.to_string());
     assert!(refused.is_some_and(|e| e.contains("pipe.mcap") && e.contains("copy it into a file")));
     assert!(Recording::open(&["/dev/zero".into()]).is_err());
-}
-
-/// Every input that once made a fuzz target fail, and recordings made by orders of every kind.
-#[test]
-fn findings_of_fuzzing_stay_mended() {
-    let _alone = alone();
-    type Target = fn(&[u8]);
-    let targets: [(&str, Target); 3] = [
-        ("recording", recordings::recording),
-        ("records", recordings::records),
-        ("message", recordings::message),
-    ];
-    for (name, target) in targets {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/regressions").join(name);
-        for entry in folder.read_dir().into_iter().flatten() {
-            let path = entry.expect("an entry").path();
-            let bytes = std::fs::read(&path).expect("a finding");
-            let what = path.display().to_string();
-            measured(&what, recordings::bound(bytes.len()), || target(&bytes));
-        }
-    }
-    // Orders drawn by a generator of fixed seed (the LCG of Numerical Recipes).
-    let mut state = 1_u32;
-    for length in 0..1500 {
-        let orders: Vec<u8> = (0..length % 300)
-            .map(|_| {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                (state >> 24) as u8
-            })
-            .collect();
-        measured("orders", recordings::bound(orders.len()), || recordings::records(&orders));
-    }
 }

@@ -7,15 +7,15 @@
 #![allow(clippy::print_stdout, reason = "a test says what it counted")]
 
 use armcal_core::Severity;
-use armcal_recording::Recording;
+use armcal_recording::{Access, Recording};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use rusqlite::Connection;
 use std::collections::BTreeMap;
 use std::io::Cursor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Mutations of each recording in a normal run; all together the ignored test makes 10 000.
+/// Mutations of each recording in a normal run; all together the ignored test makes 10 000. Each is read from a map and by ranges.
 const FEW: u64 = 150;
 const MANY: u64 = 10_000;
 
@@ -180,9 +180,9 @@ fn mutate(bytes: &[u8], random: &mut Random, parts: &[usize]) -> Vec<u8> {
 type Messages = Vec<(String, u64, Vec<u8>)>;
 
 /// What is read, and whether anything is said to be lost; an error says so too.
-fn read(path: &Path, data: bool) -> (Messages, bool) {
+fn read(path: &Path, access: Access, data: bool) -> (Messages, bool) {
     let mut all = Messages::new();
-    let Ok(recording) = Recording::open(&[path.to_owned()]) else { return (all, true) };
+    let Ok(recording) = Recording::open_with(&[path.to_owned()], access) else { return (all, true) };
     let pass = recording.for_each_raw(&mut |m| {
         all.push((m.channel.topic.clone(), m.log_ns, if data { m.data.to_vec() } else { Vec::new() }));
         Ok(())
@@ -201,38 +201,81 @@ struct Count {
     silent: Vec<String>,
 }
 
-fn hold(count: &mut Count, what: &str, path: &Path, sound: &[u8], parts: &[usize], data: bool, times: u64) {
+/// A recording that is mutated.
+struct Case<'a> {
+    what: String,
+    path: &'a Path,
+    sound: &'a [u8],
+    /// Where its records or pages start.
+    parts: Vec<usize>,
+    /// Whether CRCs vouch for the data of messages.
+    data: bool,
+}
+
+fn hold(count: &mut Count, case: &Case<'_>, times: u64) {
+    let Case { what, path, sound, parts, data } = case;
     std::fs::write(path, sound).expect("written");
-    let (expected, lost) = read(path, data);
-    assert_eq!((expected.len() as u64, lost), (MESSAGES, false), "{what} as it was written");
+    let ways = ways(path);
+    let (expected, _) = read(path, Access::Mapped, *data);
+    for (path, access) in &ways {
+        let found = read(path, *access, *data);
+        assert_eq!(
+            (found.0.len() as u64, found.1),
+            (MESSAGES, false),
+            "{what}, {access:?}, as it was written"
+        );
+    }
     for seed in 1..=times {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let bytes = mutate(sound, &mut random, parts);
         std::fs::write(path, &bytes).expect("written");
-        let (found, told) = read(path, data);
-        count.mutations += 1;
-        count.losses += u64::from(found != expected);
-        count.told += u64::from(told);
-        if found != expected && !told {
-            count.silent.push(format!("{what}, seed {seed}: {} messages", found.len()));
+        for (path, access) in &ways {
+            let (found, told) = read(path, *access, *data);
+            count.mutations += 1;
+            count.losses += u64::from(found != expected);
+            count.told += u64::from(told);
+            if found != expected && !told {
+                count.silent.push(format!("{what}, {access:?}, seed {seed}: {} messages", found.len()));
+            }
         }
     }
 }
 
+/// The folder that a store serves as its bucket, in the process that reads from one.
+const SERVED: &str = "ARMCAL_TEST_SERVED";
+
+/// How a recording is read: from a map and by ranges; or from the store alone.
+fn ways(path: &Path) -> Vec<(PathBuf, Access)> {
+    match std::env::var_os(SERVED) {
+        Some(folder) => {
+            let key = path.strip_prefix(folder).expect("it is served").display();
+            vec![(format!("s3://lab/{key}").into(), Access::Ranges)]
+        }
+        None => [Access::Mapped, Access::Ranges].map(|access| (path.to_owned(), access)).to_vec(),
+    }
+}
+
+fn folder() -> tempfile::TempDir {
+    let within = std::env::var_os(SERVED).map_or_else(std::env::temp_dir, PathBuf::from);
+    tempfile::tempdir_in(within).expect("a folder")
+}
+
 fn sweep(times: u64) -> Count {
     let mut count = Count::default();
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder();
     for style in STYLES {
         let bytes = mcap_file(style);
-        let path = folder.path().join("recording.mcap");
-        hold(&mut count, &format!("{style:?}"), &path, &bytes, &records(&bytes), style.crcs, times);
+        let path = &folder.path().join("recording.mcap");
+        let (what, parts) = (format!("{style:?}"), records(&bytes));
+        hold(&mut count, &Case { what, path, sound: &bytes, parts, data: style.crcs }, times);
     }
     for described in [true, false] {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = self::folder();
         let bytes = bag(folder.path(), described);
-        let pages: Vec<usize> = (0..bytes.len()).step_by(4096).collect();
-        let what = format!("a bag, described: {described}");
-        hold(&mut count, &what, &folder.path().join("bag.db3"), &bytes, &pages, false, times);
+        let path = &folder.path().join("bag.db3");
+        let (what, parts) =
+            (format!("a bag, described: {described}"), (0..bytes.len()).step_by(4096).collect());
+        hold(&mut count, &Case { what, path, sound: &bytes, parts, data: false }, times);
     }
     count
 }
@@ -240,7 +283,7 @@ fn sweep(times: u64) -> Count {
 #[test]
 fn no_loss_is_silent() {
     let count = sweep(FEW);
-    println!("{} mutations, {} with losses, {} told", count.mutations, count.losses, count.told);
+    println!("{} readings of mutations, {} with losses, {} told", count.mutations, count.losses, count.told);
     assert!(count.losses > count.mutations / 2, "the mutations do harm: {count:?}");
     assert!(count.silent.is_empty(), "{:#?}", count.silent);
 }
@@ -249,6 +292,64 @@ fn no_loss_is_silent() {
 #[ignore = "10 000 mutations take a minute; `cargo test -p armcal-recording --test silent -- --ignored --nocapture`"]
 fn no_loss_of_ten_thousand_mutations_is_silent() {
     let count = sweep(MANY / (STYLES.len() as u64 + 2));
-    println!("{} mutations, {} with losses, {} told", count.mutations, count.losses, count.told);
+    println!("{} readings of mutations, {} with losses, {} told", count.mutations, count.losses, count.told);
     assert!(count.silent.is_empty(), "{:#?}", count.silent);
+}
+
+/// Answers requests for ranges of files as S3 does.
+#[cfg(feature = "s3")]
+fn serve(store: &std::net::TcpListener, folder: &Path) {
+    use std::io::{BufRead as _, BufReader, Write as _};
+    while let Ok((mut client, _)) = store.accept() {
+        let folder = folder.to_owned();
+        std::thread::spawn(move || {
+            client.set_nodelay(true).expect("set");
+            let mut lines = BufReader::new(client.try_clone().expect("cloned")).lines().map_while(Result::ok);
+            while let Some(asked) = lines.next() {
+                let headers: Vec<String> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
+                let range =
+                    headers.iter().find_map(|line| line.strip_prefix("range: bytes=")).expect("a range");
+                let path = asked.split(' ').nth(1).expect("a path").trim_start_matches("/lab/");
+                let bytes = std::fs::read(folder.join(path)).expect("served");
+                let (from, to) = range.split_once('-').expect("two ends");
+                let number = |text: &str| text.parse::<usize>().expect("a number");
+                let (from, to) = match from {
+                    "" => (bytes.len().saturating_sub(number(to)), bytes.len()),
+                    from => (number(from), bytes.len().min(number(to) + 1)),
+                };
+                let head = format!(
+                    "HTTP/1.1 206 Partial Content\r\nContent-Length: {}\r\nContent-Range: bytes {from}-{}/{}\r\n\
+                     ETag: \"1\"\r\nLast-Modified: Thu, 01 Jan 2026 00:00:00 GMT\r\n\r\n",
+                    to - from,
+                    to.saturating_sub(1),
+                    bytes.len()
+                );
+                if client.write_all(&[head.as_bytes(), &bytes[from..to]].concat()).is_err() {
+                    break;
+                }
+            }
+        });
+    }
+}
+
+#[cfg(feature = "s3")]
+#[test]
+fn no_loss_is_silent_in_a_bucket() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = store.local_addr().expect("bound").port();
+    let served = folder.path().to_owned();
+    std::thread::spawn(move || serve(&store, &served));
+    // Where the store is, a process is told by its environment.
+    let output = std::process::Command::new(std::env::current_exe().expect("this test"))
+        .args(["--exact", "no_loss_is_silent", "--nocapture"])
+        .env(SERVED, folder.path())
+        .env("AWS_ENDPOINT_URL", format!("http://127.0.0.1:{port}"))
+        .envs([("AWS_ALLOW_HTTP", "true"), ("AWS_REGION", "x"), ("AWS_SKIP_SIGNATURE", "true")])
+        .env("NO_PROXY", "127.0.0.1")
+        .output()
+        .expect("started");
+    let said = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat();
+    println!("{said}");
+    assert!(output.status.success() && said.contains("1 passed"), "{said}");
 }

@@ -13,6 +13,9 @@ pub enum ReportError {
     /// A file cannot be written, or an input not be passed through.
     #[error("writing {}: {source}", path.display())]
     Write { path: PathBuf, source: Box<armcal_recording::RecordingError> },
+    /// A recording cannot be read once more for its hash.
+    #[error("hashing a recording for the summary: {0}")]
+    Hash(Box<armcal_recording::RecordingError>),
     /// A table cannot be encoded as Parquet.
     #[error("encoding the table {table} as Parquet: {source}")]
     Parquet { table: &'static str, source: Box<dyn std::error::Error + Send + Sync> },

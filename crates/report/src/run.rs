@@ -2,6 +2,7 @@
 
 pub use armcal_campaign::Status;
 
+use crate::ReportError;
 use crate::adequate::as_wanted;
 use crate::diagnosis_text::{headline, setup_beside, setup_sentence};
 use crate::past_observations::ObservedFile;
@@ -12,10 +13,11 @@ use armcal_core::{Dwell, DwellId, ErrorStats, Observation, Rejection, Role, Setu
 use armcal_diagnose::Diagnosis;
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Model, Session};
-use armcal_recording::{FileReport, RecordingReport, sha256_of};
+use armcal_recording::{FileReport, RecordingError, RecordingReport, sha256_of};
 use armcal_table::{Assignment, Association, Board, Place};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind::NotFound;
 use std::path::{Path, PathBuf};
 
 /// Version of the tool, as every output states it.
@@ -379,20 +381,25 @@ impl RecordingRun {
 
     /// SHA-256 of the file, for whoever compares it with what `sha256sum` prints; of those of all files, one a line, for a
     /// split recording. Of an object, and of what an earlier result was made from, the identity stands for it.
-    pub fn sha256(&self) -> String {
-        let local = |f: &FileReport| match f.object {
+    ///
+    /// # Errors
+    /// A file that is there and cannot be read.
+    pub fn sha256(&self) -> Result<String, ReportError> {
+        let local = |f: &FileReport| match sha256_of(&f.path) {
             // A file that is gone by now cannot be compared with anything.
-            None => sha256_of(&f.path).unwrap_or_default(),
-            Some(_) => f.identity.clone(),
+            Err(RecordingError::Open { source, .. }) if source.kind() == NotFound => Ok(String::new()),
+            hash => hash.map_err(|source| ReportError::Hash(Box::new(source))),
         };
-        let read = || self.report.files.iter().map(local).collect();
-        let earlier = |e: &EarlierResult| e.files.iter().map(|f| f.identity.clone()).collect();
-        let hashes: Vec<String> = self.earlier.as_ref().map_or_else(read, earlier);
-        match hashes.as_slice() {
+        let hash = |f: &FileReport| if f.object.is_some() { Ok(f.identity.clone()) } else { local(f) };
+        let hashes: Vec<String> = match &self.earlier {
+            Some(earlier) => earlier.files.iter().map(|f| f.identity.clone()).collect(),
+            None => self.report.files.iter().map(hash).collect::<Result<_, _>>()?,
+        };
+        Ok(match hashes.as_slice() {
             [] => String::new(),
             [hash] => hash.clone(),
             hashes => crate::sha256(&hashes.iter().map(|hash| format!("{hash}\n")).collect::<String>()),
-        }
+        })
     }
 }
 

@@ -7,6 +7,7 @@
 //! could know beforehand (base, tool, a board whose pose is estimated); `fitted_mm` is the error with
 //! the calibrated parameters. On the `holdout` side both are predictions for points no fit saw.
 
+use crate::ReportError;
 use crate::by_marker::by_marker;
 use crate::diagnosis_summary::diagnosis_summary;
 use crate::parameters::frames;
@@ -24,11 +25,14 @@ use std::path::Path;
 pub const SCHEMA: &str = "armcal.summary/1";
 
 /// The summary of a run: indented JSON with a final newline.
-pub fn summary_json(run: &Run) -> String {
-    format!("{:#}\n", summary(run))
+///
+/// # Errors
+/// A recording that cannot be read once more for its hash.
+pub fn summary_json(run: &Run) -> Result<String, ReportError> {
+    Ok(format!("{:#}\n", summary(run)?))
 }
 
-fn summary(run: &Run) -> Value {
+fn summary(run: &Run) -> Result<Value, ReportError> {
     let answer = run.answer();
     let begin = json!({
         "schema": SCHEMA,
@@ -37,7 +41,7 @@ fn summary(run: &Run) -> Value {
         "status": run.status(),
     });
     let what = json!({
-        "recordings": run.recordings.iter().map(|r| recording(run, r)).collect::<Value>(),
+        "recordings": run.recordings.iter().map(|r| recording(run, r)).collect::<Result<Value, _>>()?,
         "fit": fit(&run.calibration),
     });
     let markers = by_marker(run);
@@ -59,7 +63,7 @@ fn summary(run: &Run) -> Value {
         "conclusion": conclusion(&run.calibration),
         "warnings": run.overall_warnings(),
     });
-    joined([
+    Ok(joined([
         begin,
         // Of two arms whose tips are joined: their names, how, and the length of a link. An error is a closing error then.
         json!(TwoArms::of(run)),
@@ -67,7 +71,7 @@ fn summary(run: &Run) -> Value {
         // Errors by marker, the tip among them; absent of an arm without markers.
         if markers.is_empty() { Value::Null } else { json!({ "markers": markers }) },
         rest,
-    ])
+    ]))
 }
 
 /// One object with the fields of several, in their order; `null` has none.
@@ -90,15 +94,15 @@ fn joints(run: &Run) -> Value {
     visited.into_iter().enumerate().map(joint).collect()
 }
 
-fn recording(run: &Run, r: &RecordingRun) -> Value {
+fn recording(run: &Run, r: &RecordingRun) -> Result<Value, ReportError> {
     let clock = r.clock.as_ref();
     // What is declared has no standard error.
     let estimated = clock.filter(|c| !c.declared);
     let rejected = r.rejections.iter().map(|x| json!({ "dwell": x.dwell.dwell, "why": x.why }));
-    json!({
+    Ok(json!({
         "name": r.name,
         "path": r.paths.first().map(|p| path_text(p)).unwrap_or_default(),
-        "sha256": r.sha256(),
+        "sha256": r.sha256()?,
         "files": r.files(),
         "dwells": r.found(),
         "associated": run.associated(r),
@@ -113,7 +117,7 @@ fn recording(run: &Run, r: &RecordingRun) -> Value {
         // Sensor time at which the offset holds.
         "clock_reference_ns": clock.map(|c| c.reference_ns),
         "warnings": r.all_warnings(),
-    })
+    }))
 }
 
 /// Where the tip was during a dwell.

@@ -56,7 +56,7 @@ pub fn write_all(
         true => (pool_json::FILE, pool_json(run)),
         false => (OBSERVATIONS_FILE, observations_json(run)?),
     };
-    let summary = summary_json(run);
+    let summary = summary_json(run)?;
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
     let layouts = layouts(run, &points, &findings);
@@ -137,7 +137,7 @@ fn files<'a>(
 /// A file that cannot be written, or a run whose parts do not belong together.
 pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
     let texts = [
-        (SUMMARY, summary_json(run)),
+        (SUMMARY, summary_json(run)?),
         (PARAMETERS, parameters_toml(run)?),
         (armcal_model_file::FILE, past_model::of_run(run)?.json().map_err(ReportError::Page)?),
         (OBSERVATIONS_FILE, observations_json(run)?),

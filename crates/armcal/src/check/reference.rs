@@ -79,7 +79,7 @@ impl Calibrated {
 
     /// The result to be judged.
     pub fn of(run: &Run) -> Result<Calibrated, Error> {
-        serde_json::from_str(&summary_json(run)).map_err(Error::Json)
+        serde_json::from_str(&summary_json(run)?).map_err(Error::Json)
     }
 
     /// Parameters of the robot and of its effects; frames are compared as frames.

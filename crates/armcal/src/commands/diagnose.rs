@@ -32,7 +32,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     let (run, _) = story::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
     progress.finish();
     if json {
-        let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)).map_err(Error::Json)?;
+        let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)?).map_err(Error::Json)?;
         print(&super::json_text(&super::with_losses(summary["diagnosis"].clone()))?)?;
     } else {
         print(&diagnosis_text(&run, style()))?;

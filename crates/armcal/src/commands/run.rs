@@ -21,7 +21,7 @@ pub fn run(path: &Path, out: &Path, detail: Detail, json: bool) -> Result<Outcom
     progress.finish();
 
     if json {
-        print(&summary_json(&run))?;
+        print(&summary_json(&run)?)?;
     } else {
         print(&terminal(&run, style(), detail))?;
         print_written(out, &written)?;

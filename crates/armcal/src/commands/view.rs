@@ -15,7 +15,8 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
     let bench = Bench::of(&path, &results, &progress)?;
     progress.finish();
     let written = read_to_string(&input.join("summary.json"), Kind::Data);
-    if written.is_ok_and(|text| text != summary_json(bench.run())) {
+    let now = summary_json(bench.run())?;
+    if written.is_ok_and(|text| text != now) {
         print(&format!(
             "{} holds other results than its pipeline and recordings give now; the page shows what they give now.\n",
             input.display()

@@ -1,17 +1,24 @@
 //! An allocator that counts, to hold what is reserved against what the input could hold.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::SeqCst};
+use std::cell::Cell;
 
-/// The system's allocator, counted. Memory of C libraries (the contexts of zstd and lz4) is not.
+/// The system's allocator, counted by thread. Memory of C libraries (the contexts of zstd and lz4, pages of SQLite) is not.
 pub struct Counting;
 
-static LIVE: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
+// Neither is made when it is first used nor dropped, so that an allocator may use them.
+thread_local! {
+    static LIVE: Cell<isize> = const { Cell::new(0) };
+    static PEAK: Cell<isize> = const { Cell::new(0) };
+}
 
 fn grown(bytes: usize) {
-    let live = LIVE.fetch_add(bytes, SeqCst) + bytes;
-    PEAK.fetch_max(live, SeqCst);
+    LIVE.set(LIVE.get().wrapping_add_unsigned(bytes));
+    PEAK.set(PEAK.get().max(LIVE.get()));
+}
+
+fn shrunk(bytes: usize) {
+    LIVE.set(LIVE.get().wrapping_sub_unsigned(bytes));
 }
 
 #[expect(unsafe_code, reason = "an allocator is")]
@@ -28,21 +35,21 @@ unsafe impl GlobalAlloc for Counting {
     }
 
     unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size(), SeqCst);
+        shrunk(layout.size());
         unsafe { System.dealloc(block, layout) }
     }
 
     unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         grown(size);
-        LIVE.fetch_sub(layout.size(), SeqCst);
+        shrunk(layout.size());
         unsafe { System.realloc(block, layout, size) }
     }
 }
 
-/// What `f` gives, and the most bytes that were allocated while it ran beyond those before. One caller at a time.
+/// What `f` gives, and the most bytes that this thread allocated while it ran beyond those before.
 pub fn peak_bytes<R>(f: impl FnOnce() -> R) -> (R, usize) {
-    let before = LIVE.load(SeqCst);
-    PEAK.store(before, SeqCst);
+    let before = LIVE.get();
+    PEAK.set(before);
     let result = f();
-    (result, PEAK.load(SeqCst).saturating_sub(before))
+    (result, usize::try_from(PEAK.get() - before).unwrap_or(0))
 }

@@ -1,29 +1,52 @@
 //! Recordings by construction: the input is a list of orders, each of which writes one record, sound unless the order
 //! says how it lies. Random bytes hardly ever reach what lies behind a length, a CRC and a codec; these do.
 
-const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+use std::collections::BTreeMap;
+
+pub const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 const JOINTS: &str = "string[] name\nfloat64[] position\nfloat64[] effort";
 const POINT: &str =
     "geometry_msgs/Point point\n===\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z";
 const SCALAR: &str = "float64 temperature\nfloat64 variance";
 
-/// The file that the orders make.
-pub fn mcap(orders: &[u8]) -> Vec<u8> {
-    let mut file = Writer { orders, out: MAGIC.to_vec(), chunk: None, summary: Vec::new() };
+/// What the orders make.
+pub struct Made {
+    /// The file as it was written.
+    pub sound: Vec<u8>,
+    /// The same with bits flipped, if the orders say so.
+    pub bytes: Vec<u8>,
+    /// What compressed chunks hold, by where they are in the sound file.
+    pub packed: BTreeMap<usize, Vec<u8>>,
+}
+
+/// The file that the orders make; it has an end, unless the last order wrote one.
+pub fn mcap(orders: &[u8]) -> Made {
+    let mut file = Writer { orders, out: MAGIC.to_vec(), ..Writer::default() };
     let mut header = text("ros2");
     header.extend(text("fuzz"));
     file.record(0x01, header);
     while file.order() {}
-    file.close_chunk(0, 0);
-    file.out
+    if !file.out.ends_with(MAGIC) {
+        file.end();
+    }
+    let mut bytes = file.out.clone();
+    for (at, bit) in file.flips {
+        let at = at % bytes.len();
+        bytes[at] ^= 1 << (bit % 8);
+    }
+    Made { sound: file.out, bytes, packed: file.packed }
 }
 
+#[derive(Default)]
 struct Writer<'a> {
     orders: &'a [u8],
     out: Vec<u8>,
-    /// Where it starts in `out`, and the records in it, while one is open.
+    /// The records in the chunk that is open.
     chunk: Option<Vec<u8>>,
+    packed: BTreeMap<usize, Vec<u8>>,
     summary: Vec<u8>,
+    messages: u32,
+    flips: Vec<(usize, u8)>,
 }
 
 impl Writer<'_> {
@@ -53,7 +76,11 @@ impl Writer<'_> {
         match order % 16 {
             0 => self.schema(),
             1 => self.channel(),
-            2..=4 => self.message(),
+            2 | 3 => self.message(),
+            4 => {
+                let (at, bit) = (self.number() as usize, self.byte());
+                self.flips.push((at, bit));
+            }
             5 => self.close_chunk(0, 0),
             6 => {
                 self.close_chunk(0, 0);
@@ -135,7 +162,9 @@ impl Writer<'_> {
         };
         let id = u16::from(self.byte() % 8);
         let times = [time.to_le_bytes(), time.to_le_bytes()].concat();
-        self.record(0x05, [&id.to_le_bytes()[..], &[0; 4], &times, &data].concat());
+        // No message is like another one.
+        self.messages += 1;
+        self.record(0x05, [&id.to_le_bytes()[..], &self.messages.to_le_bytes(), &times, &data].concat());
     }
 
     /// Writes the open chunk; a size or CRC that is not 0 is claimed in place of the right one.
@@ -149,6 +178,9 @@ impl Writer<'_> {
         let size = if size == 0 { records.len() as u64 } else { size };
         let crc = if crc == 0 { crc32fast::hash(&records) } else { crc };
         let offset = self.out.len() as u64;
+        if !compression.is_empty() {
+            self.packed.insert(self.out.len(), records);
+        }
         let lengths = [[0; 16].to_vec(), size.to_le_bytes().to_vec(), crc.to_le_bytes().to_vec()].concat();
         let packed = [(packed.len() as u64).to_le_bytes().to_vec(), packed].concat();
         self.record(0x06, [lengths, text(compression), packed].concat());
@@ -189,14 +221,18 @@ impl Writer<'_> {
         self.record(0x09, body);
     }
 
-    /// Data end, summary, footer, magic; a byte that is not 0 moves what the footer points to.
+    /// Data end, summary, footer, magic, with their CRCs; a byte that is not 0 moves what the footer points to.
     fn end(&mut self) {
         self.close_chunk(0, 0);
-        self.record(0x0f, vec![0; 4]);
-        let start = (self.out.len() as u64).wrapping_add_signed(i64::from(self.byte() as i8));
+        let crc = crc32fast::hash(&self.out);
+        self.record(0x0f, crc.to_le_bytes().to_vec());
+        let begun = self.out.len();
+        let start = (begun as u64).wrapping_add_signed(i64::from(self.byte() as i8));
         let summary = std::mem::take(&mut self.summary);
         self.raw(&summary);
-        self.record(0x02, [start.to_le_bytes().to_vec(), vec![0; 12]].concat());
+        self.raw(&[&[0x02][..], &20_u64.to_le_bytes(), &start.to_le_bytes(), &[0; 8]].concat());
+        let crc = crc32fast::hash(&self.out[begun..]);
+        self.raw(&crc.to_le_bytes());
         self.raw(MAGIC);
     }
 }

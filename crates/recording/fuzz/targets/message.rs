@@ -1,12 +1,9 @@
 //! A schema and a message, every encoding.
 #![no_main]
 
-use armcal_fuzz::{memory, recordings};
-
-#[global_allocator]
-static COUNTING: memory::Counting = memory::Counting;
+use armcal_fuzz::limits::{Size, held};
+use armcal_fuzz::message::message;
 
 libfuzzer_sys::fuzz_target!(init: armcal_fuzz::on_this_thread(), |bytes: &[u8]| {
-    let ((), peak) = memory::peak_bytes(|| recordings::message(bytes));
-    assert!(peak <= recordings::bound(bytes.len()), "{peak} bytes for {}", bytes.len());
+    held(Size::plain(bytes), || message(bytes));
 });

@@ -1,4 +1,9 @@
 //! See `armcal_fuzz::files::pipeline`.
 #![no_main]
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| armcal_fuzz::files::pipeline(bytes));
+use armcal_fuzz::files::pipeline;
+use armcal_fuzz::limits::{Size, held};
+
+libfuzzer_sys::fuzz_target!(init: armcal_fuzz::on_this_thread(), |bytes: &[u8]| {
+    held(Size::plain(bytes), || pipeline(bytes));
+});

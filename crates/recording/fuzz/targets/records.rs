@@ -1,12 +1,4 @@
-//! Recordings made of mostly sound records.
+//! Recordings made of mostly sound records, compared with what was written.
 #![no_main]
 
-use armcal_fuzz::{memory, recordings};
-
-#[global_allocator]
-static COUNTING: memory::Counting = memory::Counting;
-
-libfuzzer_sys::fuzz_target!(init: armcal_fuzz::on_this_thread(), |bytes: &[u8]| {
-    let ((), peak) = memory::peak_bytes(|| recordings::records(bytes));
-    assert!(peak <= recordings::bound(bytes.len()), "{peak} bytes for {}", bytes.len());
-});
+libfuzzer_sys::fuzz_target!(init: armcal_fuzz::on_this_thread(), |bytes: &[u8]| armcal_fuzz::compared::records_of(bytes));

@@ -1,4 +1,4 @@
-//! No target: writes what fuzzing starts from into `corpus/` when it is run with `-runs=0`. Small recordings made here, and
+//! No target: writes what fuzzing starts from into `grown/` when it is run with `-runs=0`. Small recordings made here, and
 //! the files that the repository ships. It is built like a target because instrumented crates link only so.
 #![no_main]
 
@@ -15,6 +15,7 @@ libfuzzer_sys::fuzz_target!(init: write().expect("writing the seeds"), |_bytes: 
 fn write() -> Any<()> {
     let fuzz = Path::new(env!("CARGO_MANIFEST_DIR"));
     recordings(fuzz)?;
+    bags(fuzz)?;
     messages(fuzz)?;
     #[cfg(feature = "files")]
     written(fuzz)?;
@@ -75,7 +76,7 @@ fn seed(fuzz: &Path, target: &str, kind: u8, bytes: &[u8]) -> Any<()> {
 }
 
 fn put(fuzz: &Path, target: &str, bytes: &[u8]) -> Any<()> {
-    let folder = fuzz.join("corpus").join(target);
+    let folder = fuzz.join("grown").join(target);
     std::fs::create_dir_all(&folder)?;
     Ok(std::fs::write(folder.join(format!("seed-{:08x}", crc32fast::hash(bytes))), bytes)?)
 }
@@ -118,7 +119,21 @@ fn recordings(fuzz: &Path) -> Any<()> {
             }
             orders.extend([5, compression, 8, 0, 2, 7, 7, 11, 0, 12, 0, 12, 0]);
             put(fuzz, "records", &orders)?;
-            put(fuzz, "recording", &structured::mcap(&orders))?;
+            put(fuzz, "recording", &structured::mcap(&orders).bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Rows of both topics, with a description and a log or without; then one of the ways in which they break.
+fn bags(fuzz: &Path) -> Any<()> {
+    let breaks: [&[u8]; 7] =
+        [&[], &[2, 40], &[5, 8, 9, 0, 3], &[6, 12, 0, 0, 3], &[7, 30, 0, 0, 0], &[133, 2, 9, 0, 3], &[135, 9, 0, 0, 0]];
+    for described in [0, 1] {
+        for log in [&[][..], &[3, 8, 20, 30, 4, 0, 9, 40]] {
+            for broken in breaks {
+                put(fuzz, "bag", &[&[described, 0, 31, 40, 8, 31, 90, 0, 31, 200], log, broken].concat())?;
+            }
         }
     }
     Ok(())

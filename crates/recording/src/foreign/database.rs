@@ -5,6 +5,7 @@ use super::copy::Copy;
 use super::wal::Frames;
 use crate::layout::mixed;
 use crate::{RecordingError, shortened};
+use rusqlite::ffi::{self, SQLITE_IOERR, SQLITE_IOERR_SHORT_READ};
 use rusqlite::{Connection, Error, ErrorCode};
 use std::path::Path;
 
@@ -13,8 +14,14 @@ const LEAST_ROW_BYTES: u64 = 8;
 
 /// Whether SQLite failed because the disk did: not a damaged database, but one that cannot be read.
 pub(super) fn is_of_disk(error: &Error) -> bool {
-    let failures =
-        [ErrorCode::SystemIoFailure, ErrorCode::CannotOpen, ErrorCode::PermissionDenied, ErrorCode::DiskFull];
+    // What is opened for writing is a copy: where that is refused, SQLite goes on without writing until it must.
+    let failures = [
+        ErrorCode::SystemIoFailure,
+        ErrorCode::CannotOpen,
+        ErrorCode::PermissionDenied,
+        ErrorCode::ReadOnly,
+        ErrorCode::DiskFull,
+    ];
     error.sqlite_error_code().is_some_and(|code| failures.contains(&code))
 }
 
@@ -39,6 +46,14 @@ pub(super) fn quick_check(database: &Connection, copy: &mut Copy) -> Result<(), 
     let said = database.query_row("PRAGMA quick_check(1)", [], |row| row.get::<_, String>(0));
     let said = noted(said, copy, "the database is damaged")?;
     if let Some(said) = said.filter(|said| said != "ok") {
+        // A page that the disk refuses is told like one that is damaged, by the number of its error; the end of a file that is
+        // too short has one too.
+        let code = said.rsplit_once("error code=").and_then(|(_, code)| code.trim().parse().ok());
+        if let Some(code) =
+            code.filter(|code| code & 0xff == SQLITE_IOERR && *code != SQLITE_IOERR_SHORT_READ)
+        {
+            return Err(failed(copy.path(), Error::SqliteFailure(ffi::Error::new(code), None)));
+        }
         let words: Vec<&str> = said.split_whitespace().collect();
         copy.lost(format!(
             "the database is damaged: SQLite's quick_check says {:?}",

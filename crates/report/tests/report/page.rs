@@ -18,7 +18,8 @@ fn document(page: &str) -> Value {
 fn the_page_shows_the_numbers_of_the_summary() {
     let run = synthetic().run;
     let page = report_html(&run, &Basis::of(&run), PageKind::File).unwrap();
-    let (document, summary) = (document(&page), serde_json::from_str::<Value>(&summary_json(&run)).unwrap());
+    let (document, summary) =
+        (document(&page), serde_json::from_str::<Value>(&summary_json(&run).unwrap()).unwrap());
     for side in ["train", "holdout"] {
         for model in ["nominal_mm", "fitted_mm"] {
             for statistic in ["mean", "rms", "p95", "max"] {

@@ -80,7 +80,7 @@ fn people_are_told_names_of_recordings_and_programs_their_indices() {
     let page = report_html(&s.run, &Basis::of(&s.run), PageKind::File).unwrap();
     let [subject_told, message_told] = told.split_once(": ").map(|(a, b)| [a, b]).unwrap();
     assert!(flat(&page).contains(&format!("<td>{subject_told}</td><td>{message_told}</td>")));
-    let summary = summary_json(&s.run);
+    let summary = summary_json(&s.run).unwrap();
     assert!(summary.contains(subject) && summary.contains(message));
 }
 

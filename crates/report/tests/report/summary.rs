@@ -70,7 +70,7 @@ struct Parameter {
 #[test]
 fn the_contract_holds() {
     let s = synthetic();
-    let json = summary_json(&s.run);
+    let json = summary_json(&s.run).unwrap();
     let summary: Summary = serde_json::from_str(&json).unwrap();
     assert_eq!(summary.schema, SCHEMA);
     assert!(summary.diagnosis.is_null() && json.contains("\"diagnosis\": null"));
@@ -113,7 +113,7 @@ fn what_is_not_known_is_null_and_never_zero() {
     s.run.calibration.holdout = Default::default();
     s.run.calibration.noise_floor_m = f64::NAN;
     s.run.calibration.fit.estimates[0].value = f64::INFINITY;
-    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run)).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run).unwrap()).unwrap();
     let fit = &summary["fit"];
     assert_eq!(fit["holdout"]["n"], 0);
     assert!(fit["holdout"]["fitted_mm"]["mean"].is_null() && fit["noise_floor_mm"].is_null());
@@ -133,7 +133,7 @@ fn the_status_is_that_of_the_gravest_warning() {
 }
 
 fn status(run: &armcal_report::Run) -> String {
-    let summary: serde_json::Value = serde_json::from_str(&summary_json(run)).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(run).unwrap()).unwrap();
     summary["status"].as_str().unwrap().to_owned()
 }
 
@@ -144,7 +144,7 @@ fn a_split_recording_has_one_hash_and_all_its_files() {
     let first = &mut s.run.recordings[0];
     first.report.files.push(second);
     first.paths = vec!["input0.mcap".into(), "input1.mcap".into()];
-    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run)).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run).unwrap()).unwrap();
     let recording = &summary["recordings"][0];
     assert_eq!(recording["files"][1]["path"], "input1.mcap");
     let digest = |path| format!("{}\n", sha256(&std::fs::read(path).unwrap()));
@@ -157,7 +157,7 @@ fn without_a_board_a_dwell_the_fit_uses_is_an_associated_one() {
     let mut s = synthetic();
     s.run.board = None;
     s.run.recordings.iter_mut().for_each(|r| r.association = None);
-    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run)).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run).unwrap()).unwrap();
     assert_eq!(summary["recordings"][0]["associated"], 5);
     assert_eq!(summary["recordings"][2]["associated"], 4);
 }

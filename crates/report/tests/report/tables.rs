@@ -148,7 +148,7 @@ fn a_calibrated_urdf_predicts_like_the_calibration() {
 #[test]
 fn what_the_urdf_cannot_hold_is_said() {
     let s = with_urdf(Frame::estimated("tip", Pose::identity()));
-    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run)).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary_json(&s.run).unwrap()).unwrap();
     let codes: Vec<&str> =
         summary["warnings"].as_array().unwrap().iter().map(|w| w["code"].as_str().unwrap()).collect();
     assert_eq!(codes.iter().filter(|c| **c == "tip-not-in-urdf").count(), 1);
