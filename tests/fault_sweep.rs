@@ -15,8 +15,18 @@ const MALFORMED: &str = "disk image is malformed";
 const FAULTS: [(&str, &str, i32, &[&str]); 10] = [
     ("read", "", libc::EIO, &["Input/output error", "disk I/O error", MALFORMED]),
     ("read", "", libc::ESTALE, &["Stale file handle", "disk I/O error"]),
-    ("open", "", libc::EACCES, &["Permission denied", "unable to open", "readonly database"]),
-    ("open", "", libc::EMFILE, &["Too many open files", "unable to open", "readonly database"]),
+    (
+        "open",
+        "",
+        libc::EACCES,
+        &["Permission denied", "unable to open", "readonly database", "disk I/O error"],
+    ),
+    (
+        "open",
+        "",
+        libc::EMFILE,
+        &["Too many open files", "unable to open", "readonly database", "disk I/O error"],
+    ),
     ("mmap", "", libc::ENOMEM, &["Cannot allocate memory", "disk I/O error"]),
     // Refused once, it is tried in another way.
     ("rename", "", libc::EACCES, &["Permission denied"]),
