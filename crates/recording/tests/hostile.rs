@@ -150,7 +150,6 @@ fn messages_that_are_bombs_end_the_pass() {
 /// What one pass may inflate is inflated by ten of them and no more: nobody has a recording read again and again.
 #[test]
 fn passes_over_a_recording_are_limited_together() {
-    let _alone = alone();
     // A record of somebody else's, of 1 MiB.
     let records = record(0x90, &vec![0; (1 << 20) - 9]);
     let packed = zstd::bulk::compress(&records, 3).expect("compresses");
@@ -209,7 +208,6 @@ fn records_that_say_nothing_take_no_memory_each() {
 /// with the program itself, which is 20 of them.
 #[test]
 fn definitions_and_lists_take_memory_in_proportion() {
-    let _alone = alone();
     let schema = |id: u16, data: &str| {
         let name = format!("a/J{id}");
         let text = [text(name.as_bytes()), text(b"ros2msg"), text(data.as_bytes())].concat();
@@ -258,7 +256,6 @@ fn definitions_and_lists_take_memory_in_proportion() {
 /// is allowed.
 #[test]
 fn definitions_in_chunks_are_held_once_and_to_their_limit() {
-    let _alone = alone();
     let chunk_of = |id: u16| {
         let noise: Vec<u8> = (0..5_000_u32)
             .flat_map(|i| (i + u32::from(id)).wrapping_mul(2_654_435_761).to_le_bytes())
