@@ -120,11 +120,12 @@ fn settled(
         grade = judged.grade(config).max(Grade::OrUnlisted);
     }
     // One step, far from where the fit ends, may promise what no refit keeps.
+    let mut refitted = judged.clone();
     if let Some((_, score)) = refits.iter().find(|(k, _)| *k == first) {
-        judged.refitted(score.clone(), &nothing);
-        if judged.is_refuted(config) {
-            return None;
-        }
+        refitted.refitted(score.clone(), &nothing);
+    }
+    if refitted.is_refuted(config) {
+        return None;
     }
     // Of the shape of the name it is no other answer.
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
