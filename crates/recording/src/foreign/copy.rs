@@ -116,6 +116,8 @@ pub(super) fn no_room(path: &Path) -> impl Fn(io::Error) -> RecordingError {
 fn failed(path: &Path, error: mcap::McapError) -> RecordingError {
     match error {
         mcap::McapError::Io(source) => RecordingError::Copy { path: path.to_owned(), source },
+        // What the system refuses is this to the library, with its reason behind it.
+        mcap::McapError::Parse(refused) => no_room(path)(io::Error::other(refused.to_string())),
         other => RecordingError::Foreign { path: path.to_owned(), why: other.to_string() },
     }
 }
