@@ -7,8 +7,7 @@ use armcal_core::{Severity, Stage, Warning};
 use armcal_diagnose::ParameterReport;
 use armcal_model::EffectSpec;
 use armcal_report::{Refit, Run};
-use armcal_stages::RunError;
-use armcal_stages::Steps;
+use armcal_stages::{RunError, Steps};
 use rayon::prelude::*;
 
 /// Candidates that are refitted for the report, at most and at least.

@@ -6,8 +6,7 @@ use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use armcal_config::FramePose;
 use armcal_core::units::millimetres;
 use armcal_core::{Certainty, Pose, SetupFinding};
-use armcal_stages::Fitted;
-use armcal_stages::Inputs;
+use armcal_stages::{Fitted, Inputs};
 use rayon::prelude::*;
 
 /// Whether each recording fits by itself with a base of its own, where all together do not: something moved between them,

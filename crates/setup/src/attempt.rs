@@ -2,8 +2,7 @@
 
 use super::hypotheses::{Freedom, Hypothesis, Number};
 use super::trial::{Misfit, misfit};
-use armcal_stages::Fitted;
-use armcal_stages::Inputs;
+use armcal_stages::{Fitted, Inputs};
 use rayon::prelude::*;
 
 /// Steps of a search between two neighbours.

@@ -6,8 +6,7 @@ use super::trial::{Misfit, misfit};
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use armcal_core::Pose;
 use armcal_model::{EffectSpec, EffectTable};
-use armcal_stages::Fitted;
-use armcal_stages::Inputs;
+use armcal_stages::{Fitted, Inputs};
 use rayon::prelude::*;
 use std::cell::OnceCell;
 

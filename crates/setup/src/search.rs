@@ -9,8 +9,7 @@ use super::unseen::unseen;
 use super::weigh::{ALIKE_FACTOR, at_the_floor, best, explains, far_enough, in_doubt, outdone, sure};
 use super::words::{Side, finding, gain, moved_frame};
 use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
-use armcal_stages::Fitted;
-use armcal_stages::Inputs;
+use armcal_stages::{Fitted, Inputs};
 
 /// Mistakes one upon the other.
 const MOST_MISTAKES: usize = 3;

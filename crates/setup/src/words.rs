@@ -8,8 +8,7 @@ use super::weigh::SAME_FACTOR;
 use armcal_calibrate::Calibration;
 use armcal_core::units::millimetres;
 use armcal_core::{Certainty, SetupFinding};
-use armcal_stages::Fitted;
-use armcal_stages::Inputs;
+use armcal_stages::{Fitted, Inputs};
 
 /// Parameters of a change that are told, at most.
 const TOLD: usize = 3;

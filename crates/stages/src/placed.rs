@@ -2,8 +2,7 @@
 
 use crate::RunError;
 use armcal_calibrate::fit_frames_from;
-use armcal_config::Pipeline;
-use armcal_config::TipMount;
+use armcal_config::{Pipeline, TipMount};
 use armcal_core::{Observation, Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;

@@ -2,8 +2,7 @@
 
 use super::pattern::matching;
 use crate::error::Error;
-use armcal_config::ConfigError;
-use armcal_config::RecordingEntry;
+use armcal_config::{ConfigError, RecordingEntry};
 use armcal_recording::{input, is_recording, is_url, list, recordings_at, resolve, without_ending};
 use armcal_table::Tilt;
 use serde::Deserialize;

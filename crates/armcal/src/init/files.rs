@@ -2,8 +2,7 @@
 
 use crate::batch::{Manifest, recordings_below};
 use crate::error::Error;
-use armcal_config::ConfigError;
-use armcal_config::RecordingEntry;
+use armcal_config::{ConfigError, RecordingEntry};
 use armcal_recording::{Recording, is_recording, is_url, without_ending};
 use armcal_stages::RunError;
 use std::io::Read as _;

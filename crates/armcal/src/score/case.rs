@@ -3,8 +3,7 @@
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
-use armcal_config::ConfigError;
-use armcal_config::Pipeline;
+use armcal_config::{ConfigError, Pipeline};
 use armcal_core::Observation;
 use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose};
 use armcal_lab::scenario::{Hidden, Scenario, seal};

@@ -4,9 +4,8 @@ use super::{mistake, possible};
 use crate::beyond::apart;
 use armcal_core::{Dwell, SetupFinding};
 use armcal_dwell::MeanPose;
-use armcal_stages::Inputs;
-use armcal_stages::Seen;
 use armcal_stages::still::still_tip;
+use armcal_stages::{Inputs, Seen};
 
 /// The tip's path is long against this where an arm moves [m].
 const MOVES_M: f64 = 0.05;

@@ -2,9 +2,8 @@
 
 use super::{mistake, possible};
 use armcal_core::{Dwell, SetupFinding};
-use armcal_stages::Inputs;
-use armcal_stages::Seen;
 use armcal_stages::still::{TURNS_RAD, spread};
+use armcal_stages::{Inputs, Seen};
 
 /// Readings that end within this of each other end at one value [rad].
 const ONE_END_RAD: f64 = 2e-4;

@@ -6,8 +6,7 @@ mod bodies;
 mod joints;
 
 use armcal_core::{Certainty, Observation, Pose, Role, SetupFinding};
-use armcal_stages::Fitted;
-use armcal_stages::Inputs;
+use armcal_stages::{Fitted, Inputs};
 use armcal_table::Tilt;
 use nalgebra::{Matrix3, Vector3};
 
