@@ -134,6 +134,28 @@ fn the_same_columns_are_a_tie_and_fewer_amplitudes_come_first() {
 }
 
 #[test]
+fn what_remains_is_what_the_settled_names_leave() {
+    let config = quick();
+    let half = 0.5f64.sqrt();
+    let p = with_twin(|a, _| DMatrix::from_columns(&[half * a.column(0), half * a.column(0)]));
+    in_rooms(&p, &config, |rooms| {
+        let mut found = search(rooms, &[], &config).unwrap();
+        let room = found.accepted[0].room.clone();
+        let twin = room.weighed.entries.iter().position(|e| e.candidate.spec == "twin").unwrap();
+        let candidate = room.weighed.entries[twin].candidate.clone();
+        found.rest = rooms.with(std::slice::from_ref(&candidate)).unwrap();
+        let judged = room.judge(twin, &config);
+        found.accepted[0] = Accepted { candidate, judged, set: vec![twin], ..found.accepted[0].clone() };
+        let offers =
+            |found: &Search, name: &str| found.rest.weighed.entries.iter().any(|e| e.candidate.spec == name);
+        assert!(offers(&found, "backlash:1"));
+        settle(&mut found, rooms, &config).unwrap();
+        assert_eq!(found.accepted[0].candidate.spec, "backlash:1", "the simpler of the two");
+        assert!(!offers(&found, "backlash:1"), "the room that was settled in has it in its base");
+    });
+}
+
+#[test]
 fn within_a_standard_error_the_simplest_comes_first_and_beyond_it_what_says_more() {
     let config = quick();
     // The twin, entry 0, has two amplitudes; every other name has one.
