@@ -9,7 +9,6 @@ use armcal::score::nominal_model;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_config::Pipeline;
 use armcal_lab::scenario::{Design, Scenario};
-use armcal_pipeline as story;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -73,7 +72,9 @@ impl Golden {
 fn of_pipeline(name: &str) -> Golden {
     let path = root().join("pipelines").join(name).with_extension("toml");
     let pipeline = Pipeline::load(&path).expect("a shipped pipeline");
-    Golden::of(&story::settle(&pipeline, &Progress::silent()).expect("a calibration").fitted.calibration)
+    Golden::of(
+        &armcal_pipeline::settle(&pipeline, &Progress::silent()).expect("a calibration").fitted.calibration,
+    )
 }
 
 fn of_rig(scenario: &Scenario) -> Golden {

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Degrees in a radian.
+pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
 /// The SI unit of a number inside armcal, and how it is shown to people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Unit {

@@ -120,10 +120,9 @@ fn settled(
         grade = judged.grade(config).max(Grade::OrUnlisted);
     }
     // One step, far from where the fit ends, may promise what no refit keeps.
+    let (_, score) = refits.iter().find(|(k, _)| *k == first)?;
     let mut refitted = judged.clone();
-    if let Some((_, score)) = refits.iter().find(|(k, _)| *k == first) {
-        refitted.refitted(score.clone(), &nothing);
-    }
+    refitted.refitted(score.clone(), &nothing);
     if refitted.is_refuted(config) {
         return None;
     }

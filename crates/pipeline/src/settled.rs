@@ -10,8 +10,7 @@ use armcal_recording::Recording;
 use armcal_report::{RecordingRun, Run, Undiagnosed};
 use armcal_setup as setup;
 use armcal_stages::associated::Associated;
-use armcal_stages::{Fitted, Inputs, RunError, Steps, fit_places, frames};
-use armcal_stages::{Seen, perceive};
+use armcal_stages::{Fitted, Inputs, RunError, Seen, Steps, fit_places, frames, perceive};
 use armcal_table::Association;
 
 /// Association and fit depend on each other; more rounds than this mean they do not settle.

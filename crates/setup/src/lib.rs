@@ -25,9 +25,6 @@ mod words;
 use armcal_core::{SetupFinding, SetupReport};
 use armcal_stages::{Fitted, Inputs};
 
-/// Degrees in a radian.
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
-
 /// Looks for mistakes in the inputs of a calibration.
 pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
     let sound = facts::sound(fitted);

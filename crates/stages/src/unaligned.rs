@@ -2,10 +2,9 @@
 
 use crate::readings::LEAP_RAD;
 use crate::still::{spread, still_tip};
+use armcal_core::units::DEGREES;
 use armcal_core::{JointSamples, PoseSamples, Samples};
 
-/// Degrees in a radian.
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 /// With the right reading, the speeds agree like this.
 const AGREES: f64 = 0.97;
 /// Correlations this close to each other are the same.

@@ -7,7 +7,6 @@ use crate::walk::walk;
 use crate::{Options, Result, batch, campaign};
 use armcal::progress::Progress;
 use armcal_config::Pipeline;
-use armcal_pipeline as story;
 use armcal_pipeline::add_refits;
 use armcal_report::write_all;
 use armcal_setup as setup;
@@ -101,7 +100,7 @@ fn costs(title: String, pipeline: &Path) -> Result<Costs> {
     };
     let (done, reading) = spent(read);
     done?;
-    let settled = story::settle(&pipeline, &silent)?;
+    let settled = armcal_pipeline::settle(&pipeline, &silent)?;
     let (fitted, fitting) = spent(|| armcal_stages::fit_places(&settled.inputs, &mut |_| ()));
     let fitted = fitted?;
     let values = fitted.calibration.fit.values();

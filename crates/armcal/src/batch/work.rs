@@ -5,7 +5,6 @@ use super::store::Store;
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::{Pipeline, RecordingEntry};
-use armcal_pipeline as story;
 use armcal_report::{FailedRecording, campaign_row, write_all, write_brief};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -44,7 +43,7 @@ fn make(
     full: bool,
 ) -> Result<(), Error> {
     let silent = Progress::silent();
-    let (mut run, recordings) = story::settle(pipeline, &silent)?.diagnosed(pipeline, &silent);
+    let (mut run, recordings) = armcal_pipeline::settle(pipeline, &silent)?.diagnosed(pipeline, &silent);
     let made = store.begin()?;
     if full {
         armcal_pipeline::add_refits(&mut run, pipeline, &silent)?;

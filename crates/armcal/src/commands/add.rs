@@ -11,7 +11,7 @@ use armcal_config::Pipeline;
 use armcal_core::listed;
 use armcal_diagnose::{Diagnosis, Nested};
 use armcal_model::EffectSpec;
-use armcal_pipeline::{self as story, Settled};
+use armcal_pipeline::Settled;
 use armcal_recording::atomic;
 use armcal_report::{Comparison, PastRun, Status, diagnosis_text, nested_sentence, write_all};
 use armcal_stages::{Fitted, frames};
@@ -61,7 +61,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         extend(&pipeline, &request.pipeline, request.write.as_deref(), (new, &[]))?;
     }
     let progress = Progress::new();
-    let settled = story::settle(&pipeline, &progress)?;
+    let settled = armcal_pipeline::settle(&pipeline, &progress)?;
     let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     let Chosen { new, sets, transfer, left_out, nested } =
@@ -72,7 +72,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     effects.extend(new.iter().cloned());
     let (mut run, recordings) = settled.into_run(&pipeline);
     let before = PastRun::of(&run);
-    story::recalibrate(&mut run, &extended.pipeline, &geometry, &effects, &progress)?;
+    armcal_pipeline::recalibrate(&mut run, &extended.pipeline, &geometry, &effects, &progress)?;
     let comparison = Comparison::of(&before, &PastRun::of(&run));
 
     progress.step("writing results");
@@ -152,7 +152,9 @@ fn chosen(
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let joints = geometry.chain().joint_names();
     let nested = match &diagnosis {
-        Some(found) => story::chosen_again(pipeline, &settled.fitted.calibrated(pipeline), found, progress)?,
+        Some(found) => {
+            armcal_pipeline::chosen_again(pipeline, &settled.fitted.calibrated(pipeline), found, progress)?
+        }
         None => None,
     };
     let sets = diagnosis.as_ref().map_or_else(Vec::new, Diagnosis::sets);

@@ -7,7 +7,6 @@ use crate::error::Error;
 use crate::progress::Progress;
 use crate::view;
 use armcal_config::Pipeline;
-use armcal_pipeline as story;
 use armcal_recording::atomic;
 use armcal_report::{printable, write_all};
 use clap::Args;
@@ -61,7 +60,7 @@ fn judged(request: &Request, pipeline: &Pipeline) -> Result<Judged, Error> {
     let limits = Limits::of(pipeline, &request.pipeline)?;
     may_write(request.out.as_deref().map(|out| results(pipeline, out)).into_iter().flatten())?;
     let progress = Progress::new();
-    let (mut run, recordings) = story::settle(pipeline, &progress)?.diagnosed(pipeline, &progress);
+    let (mut run, recordings) = armcal_pipeline::settle(pipeline, &progress)?.diagnosed(pipeline, &progress);
     let judged = judge(&run, &limits)?;
     if let Some(out) = &request.out {
         armcal_pipeline::add_refits(&mut run, pipeline, &progress)?;

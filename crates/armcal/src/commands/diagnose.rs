@@ -5,7 +5,6 @@ use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_pipeline as story;
 use armcal_report::{PastRun, Status, diagnosis_text, past_diagnosis, summary_json};
 use std::path::Path;
 
@@ -29,7 +28,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     }
     let pipeline = Pipeline::load(input)?;
     let progress = Progress::new();
-    let (run, _) = story::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
+    let (run, _) = armcal_pipeline::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
     progress.finish();
     if json {
         let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)?).map_err(Error::Json)?;

@@ -6,7 +6,6 @@ use crate::progress::Progress;
 use armcal_calibrate::position_covariance_m2;
 use armcal_config::Pipeline;
 use armcal_core::{Observation, Parameter, Pose, Reference};
-use armcal_pipeline as story;
 use armcal_recording::atomic;
 use armcal_report::Run;
 use nalgebra::SMatrix;
@@ -18,7 +17,7 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(pipeline)?;
     may_write([out])?;
     let progress = Progress::new();
-    let (run, _) = story::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
+    let (run, _) = armcal_pipeline::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
     progress.finish();
     let text = format!("{:#}\n", super::with_losses(problem(&run)));
     atomic::write(out, text.as_bytes()).map_err(Error::Output)?;

@@ -8,7 +8,7 @@ use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_config::Pipeline;
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
-use armcal_pipeline::{self as story, Settled};
+use armcal_pipeline::Settled;
 use armcal_report::{number, plain_table, table_text};
 use armcal_stages::{Fitted, frames};
 use clap::Args;
@@ -56,7 +56,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         EffectSpec::parse(word, joints).map_err(Error::of_usage)?;
     }
     let progress = Progress::new();
-    let settled = story::settle(&pipeline, &progress)?;
+    let settled = armcal_pipeline::settle(&pipeline, &progress)?;
     let diagnosis = settled.diagnose(&pipeline, &progress)?;
     let open = match (&words, &diagnosis) {
         (Some(words), _) => named(words, diagnosis.as_ref(), joints)?,

@@ -5,7 +5,6 @@ use crate::error::Error;
 use crate::progress::Progress;
 use crate::view;
 use armcal_config::Pipeline;
-use armcal_pipeline as story;
 use armcal_report::{Detail, Status, run_files, summary_json, terminal, write_all};
 use std::path::{Path, PathBuf};
 
@@ -14,7 +13,7 @@ pub fn run(path: &Path, out: &Path, detail: Detail, json: bool) -> Result<Outcom
     let pipeline = Pipeline::load(path)?;
     may_write(results(&pipeline, out))?;
     let progress = Progress::new();
-    let (run, recordings) = story::run(&pipeline, &progress)?;
+    let (run, recordings) = armcal_pipeline::run(&pipeline, &progress)?;
     progress.step("writing results");
     let written = write_all(&run, &recordings, out, &pipeline.output)?;
     view::remember(out, path, &[])?;

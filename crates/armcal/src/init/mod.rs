@@ -29,7 +29,6 @@ pub use roles::{Cast, Role};
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_calibrate::HoldoutConfig;
-use armcal_pipeline as story;
 use armcal_recording::input::Kind;
 use armcal_stages::Inputs;
 use armcal_stages::associated::Associated;
@@ -212,7 +211,7 @@ fn tried(proposal: &Proposal) -> Result<Tried, String> {
         let folder =
             tempfile::tempdir().map_err(|source| Error::Folder { path: std::env::temp_dir(), source })?;
         let pipeline = proposal.in_folder(folder.path())?;
-        let settled = story::settle(&pipeline, &Progress::silent())?;
+        let settled = armcal_pipeline::settle(&pipeline, &Progress::silent())?;
         let judged = settled.fitted.calibration.judged();
         let mistakes = settled.setup.mistakes().map(|m| m.message.clone()).collect();
         Ok(Tried { points: judged.fitted.n, mean_m: [judged.nominal.mean_m, judged.fitted.mean_m], mistakes })

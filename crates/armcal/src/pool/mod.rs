@@ -12,7 +12,6 @@ use armcal_calibrate::{FitConfig, HoldoutConfig, align_frames, calibrate};
 use armcal_config::{BoardPose, FramePose, Pipeline};
 use armcal_core::Pose;
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
-use armcal_pipeline as story;
 use armcal_report::{Run, Undiagnosed};
 use armcal_stages::frames;
 use armcal_stages::joined_tips::place_bases;
@@ -62,13 +61,13 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
         board,
         transfer,
         warnings: collected.warnings,
-        ..story::run_of(pipeline, model_texts, model, (observations, session), calibration)
+        ..armcal_pipeline::run_of(pipeline, model_texts, model, (observations, session), calibration)
     };
     let free = run.model.parameters().iter().filter(|p| p.free).count();
     if free > DIAGNOSED_PARAMETERS && pipeline.diagnosis.enabled {
         run.undiagnosed = Some(Undiagnosed::TooLarge { free, most: DIAGNOSED_PARAMETERS });
     } else {
-        story::diagnose_again(&mut run, pipeline, progress);
+        armcal_pipeline::diagnose_again(&mut run, pipeline, progress);
         armcal_pipeline::add_refits(&mut run, pipeline, progress)?;
     }
     Ok(Pooled { run, geometry })

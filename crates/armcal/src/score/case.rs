@@ -9,7 +9,6 @@ use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose}
 use armcal_lab::scenario::{Hidden, Scenario, seal};
 use armcal_lab::{LabError, Nominal, Truth};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
-use armcal_pipeline as story;
 use armcal_recording::input;
 use serde::Serialize;
 use std::path::Path;
@@ -93,7 +92,7 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
     let place = seal(scenario, open.path(), &closed.path().join("truth.json"))?;
     let pipeline = Pipeline::load(&place.pipeline)?;
     let progress = Progress::silent();
-    let settled = story::settle(&pipeline, &progress)?;
+    let settled = armcal_pipeline::settle(&pipeline, &progress)?;
     let begin = std::time::Instant::now();
     let diagnosis = settled.diagnose(&pipeline, &progress)?.ok_or(Error::NotDiagnosed)?;
     let seconds = begin.elapsed().as_secs_f64();

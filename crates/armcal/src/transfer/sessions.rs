@@ -12,7 +12,7 @@ use armcal_calibrate::{HeldOut, HoldoutConfig, calibrate, compare_errors, mean_b
 use armcal_config::Pipeline;
 use armcal_core::{DwellId, Warning};
 use armcal_model::EffectSpec;
-use armcal_pipeline::{self as story, Settled};
+use armcal_pipeline::Settled;
 use armcal_report::PastArms;
 use armcal_stages::{Fitted, with_effects};
 use armcal_stages::{frames, perceive};
@@ -127,7 +127,7 @@ pub fn between(asked: &Asked<'_>, progress: &Progress) -> Result<SessionTransfer
 
 /// A session without a mistake in its setup: of another, every sentence would be about the mistake.
 fn sound(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error> {
-    let settled = story::settle(pipeline, progress)?;
+    let settled = armcal_pipeline::settle(pipeline, progress)?;
     settled.refuse_mistakes()?;
     Ok(settled)
 }

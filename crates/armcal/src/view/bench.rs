@@ -9,7 +9,6 @@ use armcal_calibrate::{FitConfig, HoldoutConfig, Stop, calibrate};
 use armcal_config::Pipeline;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, Model, catalogue};
-use armcal_pipeline as story;
 use armcal_recording::atomic;
 use armcal_report::{Basis, PageKind, Refit, Run, refit_json, report_html};
 use armcal_stages::frames;
@@ -34,7 +33,7 @@ impl Bench {
         let (pipeline, geometry, run) = match results {
             [] => {
                 let pipeline = Pipeline::load(path)?;
-                let settled = story::settle(&pipeline, progress)?;
+                let settled = armcal_pipeline::settle(&pipeline, progress)?;
                 let geometry = settled.fitted.geometry.clone();
                 let (mut run, _) = settled.diagnosed(&pipeline, progress);
                 armcal_pipeline::add_refits(&mut run, &pipeline, progress)?;

@@ -1,7 +1,7 @@
 //! Joint readings: sign, order, unit, counts a turn, zero.
 
 use super::Hypothesis;
-use crate::DEGREES;
+use armcal_core::units::DEGREES;
 use armcal_core::{Arrival, Dwell, Unit};
 use armcal_stages::Inputs;
 use std::f64::consts::FRAC_PI_2;

@@ -2,8 +2,8 @@
 
 use super::joints::ZERO;
 use super::{Estimated, Freedom, Hypothesis};
-use crate::DEGREES;
 use armcal_config::{Measure, MeasureKind};
+use armcal_core::units::DEGREES;
 use armcal_core::{Against, Parameter, Unit};
 use armcal_model::Arm;
 use armcal_recording::Streams;
