@@ -10,7 +10,7 @@ use armcal_recording::Recording;
 use armcal_report::{RecordingRun, Run, Undiagnosed};
 use armcal_setup as setup;
 use armcal_stages::associated::Associated;
-use armcal_stages::{Fitted, Inputs, RunError, Seen, Steps, fit_places, frames, perceive};
+use armcal_stages::{Fitted, Inputs, Rounds, RunError, Seen, Steps, fit_places, frames, perceive};
 use armcal_table::Association;
 
 /// Association and fit depend on each other; more rounds than this mean they do not settle.
@@ -50,11 +50,20 @@ pub fn settle(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, RunE
         most_rounds: MAX_ROUNDS,
         known: Associated::default(),
     };
-    let fitted = fit_places(&inputs, &mut |round| progress.step(&format!("calibrating (round {round})")));
+    let fitted = fit_places(&inputs, &mut Told(progress));
     progress.step("checking the setup");
     let fitted = fitted.map_err(|source| without_setup(source, &inputs))?;
     let setup = setup::examine(&inputs, &fitted);
     Ok(Settled { recordings, model_texts, inputs, setup, fitted })
+}
+
+/// Tells which round begins.
+struct Told<'a>(&'a dyn Steps);
+
+impl Rounds for Told<'_> {
+    fn begins(&mut self, round: usize) {
+        self.0.step(&format!("calibrating (round {round})"));
+    }
 }
 
 /// The error of inputs that cannot be calibrated, with the mistake of the setup that would explain it.

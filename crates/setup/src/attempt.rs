@@ -1,8 +1,9 @@
 //! Hypotheses fitted: each change, and of a change that holds a number the value that fits best.
 
 use super::hypotheses::{Freedom, Hypothesis, Number};
-use super::trial::{Misfit, misfit};
-use armcal_stages::{Fitted, Inputs};
+use super::trial::{Misfit, Trial, misfit};
+use super::weigh::SAME_FACTOR;
+use armcal_stages::{Fitted, Inputs, fit_places};
 use rayon::prelude::*;
 
 /// Steps of a search between two neighbours.
@@ -22,7 +23,7 @@ pub struct Tried {
 
 /// Those of the hypotheses that can be fitted. `before` is the misfit without any.
 pub fn attempted(now: &Inputs, before: &Misfit, all: Vec<Hypothesis>) -> Vec<Tried> {
-    let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| attempt(now, h)).collect();
+    let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| attempt(now, before, h)).collect();
     refine_numbers(now, before, &mut tried);
     tried
 }
@@ -40,19 +41,20 @@ fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
         let (values, others): (Vec<Tried>, Vec<Tried>) = std::mem::take(tried).into_iter().partition(own);
         *tried = others;
         let best = values.into_iter().min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log));
-        let worth = best.filter(|best| best.misfit.log < before.log);
-        tried.splice(place..place, worth.map(|best| refined(now, best)));
+        // A number that changes nothing fits as well at any value.
+        let worth = best.filter(|best| best.misfit.log < before.log - SAME_FACTOR.ln());
+        tried.splice(place..place, worth.map(|best| refined(now, before, best)));
     }
 }
 
 /// The best value of a number between the neighbours of the one that was tried, by golden section.
-fn refined(now: &Inputs, tried: Tried) -> Tried {
+fn refined(now: &Inputs, before: &Misfit, tried: Tried) -> Tried {
     let Some(number) = tried.hypothesis.number.clone() else { return tried };
     let ratio = (5f64.sqrt() - 1.0) / 2.0;
     let at = |value: f64| {
         let of_value = (number.at)(value);
         let number = Some(Number { value, ..number.clone() });
-        attempt(now, Hypothesis { number, freedom: Freedom::Number, ..of_value })
+        attempt(now, before, Hypothesis { number, freedom: Freedom::Number, ..of_value })
     };
     // By the spread: of a scale, the plain mean is least at too small a one.
     let mean = |t: &Option<Tried>| t.as_ref().map_or(f64::INFINITY, |t| t.misfit.of_spread());
@@ -80,10 +82,10 @@ fn refined(now: &Inputs, tried: Tried) -> Tried {
     best
 }
 
-/// A hypothesis, fitted.
-pub fn attempt(now: &Inputs, hypothesis: Hypothesis) -> Option<Tried> {
+/// A hypothesis, fitted as far as it could still explain what is left without it.
+fn attempt(now: &Inputs, before: &Misfit, hypothesis: Hypothesis) -> Option<Tried> {
     let inputs = hypothesis.undone(now);
-    let fitted = inputs.fit().ok()?;
+    let fitted = fit_places(&inputs, &mut Trial { inputs: &inputs, before }).ok()?;
     let misfit = misfit(&inputs, &fitted);
     Some(Tried { hypothesis, inputs, fitted, misfit })
 }

@@ -14,7 +14,7 @@ use armcal_stages::{Fitted, Inputs};
 /// Mistakes one upon the other.
 const MOST_MISTAKES: usize = 3;
 /// What makes the errors of the nominal arm this many times as large undoes no mistake.
-const HOPELESS: f64 = 5.0;
+const HOPELESS: f64 = 2.0;
 /// Codes of changes that let the model's own parameters go.
 const OF_THE_MODEL: [&str; 3] = ["parameter-bound", "parameter-fixed", "joint-zero"];
 

@@ -1,8 +1,7 @@
 //! Mistakes that leave no trace: with them undone the data fit as well as they are.
 
-use super::attempt::{Tried, attempt};
 use super::hypotheses::reversed;
-use super::trial::Misfit;
+use super::trial::{Misfit, misfit};
 use super::weigh::SAME_FACTOR;
 use armcal_core::Unseen;
 use armcal_core::units::millimetres;
@@ -12,7 +11,8 @@ use armcal_stages::Inputs;
 pub fn unseen(inputs: &Inputs, now: &Misfit) -> Option<Unseen> {
     let names = inputs.chain.joint_names();
     let hypothesis = reversed(names, vec![names.len().checked_sub(1)?]);
-    let Tried { hypothesis, misfit, .. } = attempt(inputs, hypothesis)?;
+    let undone = hypothesis.undone(inputs);
+    let misfit = misfit(&undone, &undone.fit().ok()?);
     let same = misfit.used == now.used && (misfit.log - now.log).abs() < SAME_FACTOR.ln();
     same.then(|| Unseen {
         code: hypothesis.code,

@@ -56,6 +56,11 @@ pub fn explains(before: &Misfit, after: &Misfit) -> bool {
     falls || seats
 }
 
+/// Whether a change that loses dwells could explain the errors, if it left no more than this of their logarithms.
+pub fn could_explain(before: &Misfit, least_log: f64) -> bool {
+    before.log - least_log >= LEAST_FACTOR.ln()
+}
+
 /// Whether a change comes near the floor, or divides the errors so much that the rest is another mistake. What estimates
 /// a number always takes a share of an error that is not its own.
 pub fn far_enough(before: &Misfit, freedom: Freedom, after: &Misfit) -> bool {
@@ -154,6 +159,15 @@ mod tests {
         assert!(!explains(&before, &Misfit { mean_m: 1.1e-3, ..kept }), "the mean fell too little");
         let divided = Misfit { log: 1.0 - 3.01f64.ln(), used: 80, ..seated(80, 5.0) };
         assert!(explains(&before, &divided), "every error is a third: dwells may change their places");
+    }
+
+    #[test]
+    fn what_loses_dwells_must_leave_a_third_of_every_error() {
+        let before = Misfit { log: 2.0, ..seated(100, 30.0) };
+        assert!(could_explain(&before, 2.0 - 1.01 * 3f64.ln()));
+        assert!(!could_explain(&before, 2.0 - 0.99 * 3f64.ln()));
+        let after = Misfit { log: 2.0 - 0.99 * 3f64.ln(), ..seated(60, 5.0) };
+        assert!(!explains(&before, &after), "what could not explain does not");
     }
 
     #[test]

@@ -20,6 +20,9 @@ pub enum RunError {
     /// A recording that is not what the pipeline relies on.
     #[error("recording `{recording}`: {problem}")]
     InRecording { recording: String, problem: String },
+    /// A trial that whoever asked for it ended.
+    #[error("nothing more could come of this trial")]
+    GivenUp,
     /// No dwell became an observation.
     #[error("none of the {dwells} dwells became an observation; {hint}")]
     NoObservations { dwells: usize, hint: String },

@@ -36,7 +36,7 @@ pub struct Inputs {
 impl Inputs {
     /// Fits them: associates, starts the frames, calibrates.
     pub fn fit(&self) -> Result<Fitted, RunError> {
-        fit_places(self, &mut |_| ())
+        fit_places(self, &mut ())
     }
 
     /// All dwells.
@@ -84,8 +84,24 @@ impl Fitted {
     }
 }
 
-/// Associates and calibrates in turn until every dwell stays in its place. `told` hears the number of each round.
-pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted, RunError> {
+/// Hears how rounds of association and fit go, and may end them before they settle.
+pub trait Rounds {
+    /// A round begins, the first with 1.
+    fn begins(&mut self, _round: usize) {}
+    /// Whether a fit to these is worth its time.
+    fn is_worth_fitting(&mut self, _observations: &[Observation]) -> bool {
+        true
+    }
+    /// Whether another round could be worth its time where this one ended so.
+    fn goes_on(&mut self, _fitted: &Fitted) -> bool {
+        true
+    }
+}
+
+impl Rounds for () {}
+
+/// Associates and calibrates in turn until every dwell stays in its place.
+pub fn fit_places(inputs: &Inputs, heard: &mut dyn Rounds) -> Result<Fitted, RunError> {
     let Inputs { pipeline, chain, board, seen, changes, known, .. } = inputs;
     let board = board.as_ref();
     let mut geometry = frames::nominal_model(pipeline, chain, board, seen)?;
@@ -105,39 +121,50 @@ pub fn fit_places(inputs: &Inputs, told: &mut dyn FnMut(usize)) -> Result<Fitted
     let mut rounds = 0;
     loop {
         rounds += 1;
-        told(rounds);
+        heard.begins(rounds);
         frames::start_frames(pipeline, &mut geometry, &places);
         let mut observed = observe::observations(pipeline, board, seen, &places);
         measures.add(&mut observed, &measured)?;
-        let Observed { observations, mut rejections } = observed.not_empty()?;
+        let Observed { observations, rejections } = observed.not_empty()?;
+        if !heard.is_worth_fitting(&observations) {
+            return Err(RunError::GivenUp);
+        }
         let model = with_effects(pipeline, &geometry, &effects, &observations)?;
         let calibration = calibrate(&model, &observations, &pipeline.fit, &pipeline.holdout)?;
-        let mut next = None;
-        if rounds < inputs.most_rounds {
-            let values = calibration.fit.values();
-            let again = observe::associate_all(pipeline, board, &model, &values, true, (seen, known))?;
-            let closing = measures.closing(&model, &calibration, &near);
-            let settled = observe::same_places(&again, &places) && closing == measured;
-            next = (!settled).then_some((again, closing));
-        }
-        match next {
-            Some(again) => (places, measured) = again,
+        let session = frames::session(pipeline, &observations);
+        let mut fitted =
+            Fitted { geometry, model, observations, session, calibration, places, rejections, rounds };
+        let again = match rounds < inputs.most_rounds && heard.goes_on(&fitted) {
+            true => moved(inputs, &fitted, (&measures, &near, &measured))?,
+            false => None,
+        };
+        match again {
+            Some(again) => (geometry, (places, measured)) = (fitted.geometry, again),
             None => {
-                measures.explain(&mut rejections, &model, &calibration);
-                let session = frames::session(pipeline, &observations);
-                return Ok(Fitted {
-                    geometry,
-                    model,
-                    observations,
-                    session,
-                    calibration,
-                    places,
-                    rejections,
-                    rounds,
-                });
+                let Fitted { rejections, model, calibration, .. } = &mut fitted;
+                measures.explain(rejections, model, calibration);
+                return Ok(fitted);
             }
         }
     }
+}
+
+/// Where dwells are on the table, by recording, and which measurements close.
+type WhereAll = (Vec<Option<Association>>, Vec<bool>);
+
+/// Where the dwells are by a fit, and what closes by it; none where both stay.
+fn moved(
+    inputs: &Inputs,
+    fitted: &Fitted,
+    (measures, near, measured): (&Measures<'_>, &[bool], &[bool]),
+) -> Result<Option<WhereAll>, RunError> {
+    let Inputs { pipeline, board, seen, known, .. } = inputs;
+    let (model, calibration) = (&fitted.model, &fitted.calibration);
+    let values = calibration.fit.values();
+    let again = observe::associate_all(pipeline, board.as_ref(), model, &values, true, (seen, known))?;
+    let closing = measures.closing(model, calibration, near);
+    let stays = observe::same_places(&again, &fitted.places) && closing == measured;
+    Ok((!stays).then_some((again, closing)))
 }
 
 /// The geometry with effects, or as it is without any.

@@ -30,7 +30,7 @@ mod unaligned;
 
 pub use declared::{Change, change_nominals, declare, override_parameters};
 pub use error::RunError;
-pub use fit::{Fitted, Inputs, fit_places, with_effects};
+pub use fit::{Fitted, Inputs, Rounds, fit_places, with_effects};
 pub use placed::{Placed, PlacedBase};
 pub use seen::Seen;
 

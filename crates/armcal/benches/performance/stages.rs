@@ -101,7 +101,7 @@ fn costs(title: String, pipeline: &Path) -> Result<Costs> {
     let (done, reading) = spent(read);
     done?;
     let settled = armcal_pipeline::settle(&pipeline, &silent)?;
-    let (fitted, fitting) = spent(|| armcal_stages::fit_places(&settled.inputs, &mut |_| ()));
+    let (fitted, fitting) = spent(|| armcal_stages::fit_places(&settled.inputs, &mut ()));
     let fitted = fitted?;
     let values = fitted.calibration.fit.values();
     let observations: Vec<_> = fitted.observations.iter().collect();

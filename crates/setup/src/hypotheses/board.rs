@@ -34,7 +34,9 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     }
     all.extend(UNITS.map(scaled));
     all.extend(Hypothesis::of_each(&SCALES, 1.0, FAR_SCALE, scaled));
-    all.extend(Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, raised));
+    if !takes_any_height(inputs) {
+        all.extend(Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, raised));
+    }
     for group in groups(&inputs.board) {
         let at = move |height_mm| raised_alone(&group, height_mm);
         all.extend(Hypothesis::of_each(&GROUP_HEIGHTS_MM, 0.0, FAR_GROUP_MM, at));
@@ -57,11 +59,11 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
 
 /// A board drawn from its other side: the outline mirrored, and the seats measured from another face. Rarer.
 pub fn from_the_other_side(inputs: &Inputs) -> Vec<Hypothesis> {
-    if inputs.board.is_none() || inputs.pipeline.table.is_none() {
-        return Vec::new();
-    }
-    // One axis of the outline reversed, whatever becomes of the heights.
-    let mirrored = symmetries().into_iter().filter(|(matrix, ..)| matrix.m11 * matrix.m22 < 0.0);
+    let Some(board) = inputs.board.as_ref().filter(|_| !takes_any_height(inputs)) else { return Vec::new() };
+    let is_flat = board.cavities.iter().all(|c| c.in_board_m.z == 0.0);
+    // One axis of the outline reversed, whatever becomes of the heights: of a board that has none, it is mirrored.
+    let outlines = symmetries().into_iter().filter(|(matrix, ..)| matrix.m11 * matrix.m22 < 0.0);
+    let mirrored = outlines.filter(|(matrix, ..)| !is_flat || matrix.m33 > 0.0);
     let of_each = |(matrix, words, code): (Matrix3<f64>, &'static str, &'static str)| {
         let at = move |height_mm: f64| {
             let change = format!("the board {words} and its seats {}", higher(height_mm));
@@ -72,6 +74,11 @@ pub fn from_the_other_side(inputs: &Inputs) -> Vec<Hypothesis> {
         Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, at)
     };
     mirrored.flat_map(of_each).collect()
+}
+
+/// Whether the height of all seats changes nothing: there are none, or the pose of their board is estimated in every recording.
+fn takes_any_height(inputs: &Inputs) -> bool {
+    inputs.pipeline.table.as_ref().is_none_or(|table| table.pose == BoardPose::Estimated)
 }
 
 /// Names of cavities without their numbers, where there is more than one.
