@@ -227,6 +227,12 @@ impl<'a> Rooms<'a> {
         score
     }
 
+    /// What a refit with these effects is to have scored.
+    #[cfg(test)]
+    pub fn suppose(&mut self, accepted: &[Candidate], room: &Room, score: Option<Score>) {
+        self.scores.insert((names(accepted), room.scatter.remembers()), score);
+    }
+
     /// A problem without the dwells that do not count.
     fn kept(&mut self, problem: Problem) -> Result<Problem, DiagnoseError> {
         problem.check()?;

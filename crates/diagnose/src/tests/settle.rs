@@ -209,3 +209,109 @@ fn a_size_that_cannot_be_negative_and_is_comes_last() {
 fn nothing_is_settled_where_nothing_was_found() {
     assert!(settled_sets(&planted(&[], 0, 5)).is_empty());
 }
+
+/// What becomes of a planted play whose refits are supposed to score so many nats a group above nothing, four groups; the other names
+/// score nothing. The best that is not listed scores `unlisted`, at this cosine to the name.
+fn settled_where(own: [f64; 4], unlisted: [f64; 4], cosine: f64) -> Option<Accepted> {
+    let config = quick();
+    let score = |each: &[f64; 4]| Some(crate::score::tests::score(each));
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    in_rooms(&p, &config, |rooms| {
+        let mut found = search(rooms, &[], &config).unwrap().accepted[0].clone();
+        let room = found.room.clone();
+        for k in near(&found, &room, &config) {
+            let each = if k == found.judged.entry { own } else { [0.0; 4] };
+            rooms.suppose(std::slice::from_ref(&room.weighed.entries[k].candidate), &room, score(&each));
+        }
+        rooms.suppose(&[], &room, score(&[0.0; 4]));
+        let (of_unlisted, of_name) = (score(&unlisted).unwrap(), score(&own).unwrap());
+        let above = of_unlisted.above(&of_name);
+        found.judged.unlisted = Some(crate::judge::Unlisted { score: of_unlisted, above, cosine });
+        settled(&found, &[], rooms, &config)
+    })
+}
+
+#[test]
+fn a_name_whose_refit_is_clearly_below_what_is_not_listed_falls() {
+    let (own, far) = ([25.0, 25.5, 25.0, 25.5], 0.1);
+    assert!(settled_where(own, [50.0, 50.5, 50.5, 50.0], far).is_none());
+    assert!(settled_where(own, [50.0, 50.5, 50.5, 50.0], 1.0).is_some(), "it is the name's own shape");
+    // As many nats, of one group alone: within its standard error.
+    assert!(settled_where(own, [126.0, 25.0, 25.5, 25.0], far).is_some());
+    assert!(settled_where(own, [1.0, 1.5, 1.5, 1.0], far).is_some());
+}
+
+#[test]
+fn a_name_falls_where_its_refit_says_no_more_than_nothing() {
+    let margin = quick().margin_nats;
+    let unlisted = [-5.0; 4];
+    let of = |nats: f64| settled_where([nats / 4.0; 4], unlisted, 0.1);
+    assert!(of(margin - 0.1).is_none());
+    assert!(of(-8.0).is_none());
+    let stands = of(10.0 * margin).expect("far above nothing");
+    assert!(stands.probability(|what| what == Instead::Nothing) < 0.01);
+    assert_eq!(stands.ranked.iter().filter(|s| s.what == Instead::Unlisted).count(), 1);
+    let alike = settled_where([25.0; 4], unlisted, 1.0).expect("it stands");
+    assert!(
+        alike.ranked.iter().all(|s| s.what != Instead::Unlisted),
+        "of its own shape it is no other answer"
+    );
+}
+
+/// The specs that [`answer`] tells where refits of these say so many nats a group more than nothing, in groups that hardly differ;
+/// and those that the user's knowledge leaves out. The name that was found is `backlash:1`.
+fn answered(p: &Problem, said: &[(&str, f64)], acts: &[&str]) -> (Vec<String>, Vec<String>) {
+    let config = quick();
+    let each = |nats: f64| crate::score::tests::score(&[nats, nats + 0.01, nats, nats + 0.01]);
+    in_rooms(p, &config, |rooms| {
+        let found = search(rooms, &[], &config).unwrap().accepted[0].clone();
+        let mut room = (*found.room).clone();
+        let at = |room: &Room, spec: &str| crate::tests::entry(&room.weighed, spec);
+        for spec in acts {
+            let k = at(&room, spec);
+            room.weighed.entries[k].candidate.known = Some("it was seen".into());
+        }
+        let own = at(&room, "backlash:1");
+        let found = Accepted { judged: room.judge(own, &config), ..found };
+        let refits: Vec<(usize, Score)> =
+            said.iter().map(|(spec, nats)| (at(&room, spec), each(*nats))).collect();
+        let (set, left_out) = answer(&found, &refits, &each(0.0), &room, &config);
+        (set.into_iter().map(|k| room.weighed.entries[k].candidate.spec.clone()).collect(), left_out)
+    })
+}
+
+#[test]
+fn an_answer_holds_what_nothing_else_is_clearly_better_than() {
+    // The twin has the columns of the play, and one more that is nearly theirs.
+    let p = with_twin(|a, _| DMatrix::from_columns(&[1.0 * a.column(0), 0.5 * a.column(0)]));
+    let of = |play: f64, twin: f64| answered(&p, &[("backlash:1", play), ("twin", twin)], &[]).0;
+    assert_eq!(
+        of(100.0, 101.5),
+        ["backlash:1", "twin"],
+        "less than the amplitude more costs, and a detail of 4 nats"
+    );
+    assert_eq!(of(100.0, 103.0), ["twin"], "12 nats more for one amplitude");
+    assert_eq!(of(100.0, 98.5), ["backlash:1"], "6 nats less, and another amplitude");
+    // A hundredth of what there is to gain is the detail of a shape.
+    assert_eq!(of(1000.0, 1008.0), ["backlash:1", "twin"]);
+    assert_eq!(of(1000.0, 1012.0), ["twin"]);
+    let no_more = quick().margin_nats / 4.0 - 0.1;
+    assert!(of(no_more, no_more).is_empty(), "no more than nothing");
+    assert!(of(-no_more, -100.0).is_empty());
+}
+
+#[test]
+fn what_is_not_real_in_these_data_is_no_answer_whatever_its_refit_says() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let (set, _) = answered(&p, &[("zero_drift:2", 100.2), ("backlash:1", 100.0)], &[]);
+    assert_eq!(set, ["backlash:1"]);
+}
+
+#[test]
+fn of_one_answer_what_is_known_to_act_is_told_and_the_others_are_named() {
+    let p = with_twin(|a, _| a.clone());
+    let said = [("backlash:1", 100.0), ("twin", 100.0)];
+    let owned = |all: &[&str]| all.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
+    assert_eq!(answered(&p, &said, &["twin"]), (owned(&["twin"]), owned(&["backlash:1"])));
+    assert_eq!(answered(&p, &said, &[]).1, owned(&[]));
+}
