@@ -77,6 +77,32 @@ fn definitions_that_are_lost_take_their_messages_with_them() {
     assert!(said.contains(&format!("{orphans} messages of channel 1, whose definition is lost")), "{said}");
 }
 
+/// Forty definitions of 1 MiB each: eight too many, unless somebody says that they may.
+#[test]
+fn more_definitions_than_usual_are_kept_where_that_is_stated() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("rec.mcap");
+    let file = std::fs::File::create(&path).expect("a file");
+    let mut writer = mcap::WriteOptions::new().compression(None).create(file).expect("a writer");
+    for k in 0..40_u16 {
+        let schema =
+            writer.add_schema(&format!("a/T{k}"), "ros2msg", &vec![b'#'; 1 << 20]).expect("a schema");
+        writer.add_channel(schema, &format!("/t{k}"), "cdr", &[].into()).expect("a channel");
+    }
+    writer.finish().expect("the end");
+    drop(writer);
+    let inspected = |mib: Option<&str>| {
+        let mut inspect = std::process::Command::new(env!("CARGO_BIN_EXE_armcal"));
+        inspect.args([Path::new("inspect"), Path::new("--json"), &path]);
+        mib.map(|mib| inspect.env("ARMCAL_INFLATE_MIB", mib));
+        let output = inspect.output().expect("armcal starts");
+        assert_no_panic(&output);
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).contains("more than they may"))
+    };
+    assert_eq!(inspected(None), (Some(3), true));
+    assert_eq!(inspected(Some("300")), (Some(0), false));
+}
+
 #[test]
 fn what_is_no_recording_is_refused() {
     let folder = tempfile::tempdir().expect("temporary folder");

@@ -13,11 +13,24 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 pub(crate) const TIMES: u64 = 100;
 /// What a recording may inflate to beyond that [bytes].
 const FREE_BYTES: u64 = 8 << 20;
+/// What definitions may take where nothing more is stated [bytes].
+const DEFINITION_BYTES: usize = 32 << 20;
 /// All passes of a command over a recording may inflate so many times what one may: the longest, `armcal init` of many bodies
 /// that cannot be read, make some more, and of a sound recording each takes a tenth of what it may.
 const PASSES: u64 = 10;
 /// The environment variable that says another number [MiB].
 pub(crate) const FREE_VARIABLE: &str = "ARMCAL_INFLATE_MIB";
+
+/// What whoever started the program says that a recording may take.
+fn stated_bytes() -> Option<u64> {
+    let mib: u64 = std::env::var(FREE_VARIABLE).ok()?.trim().parse().ok()?;
+    Some(mib.saturating_mul(1 << 20))
+}
+
+/// What the texts of all definitions of a file may take in memory [bytes]: recorders write some megabytes at most.
+pub(crate) fn most_definition_bytes() -> usize {
+    stated_bytes().map_or(DEFINITION_BYTES, |stated| DEFINITION_BYTES.max(stated as usize))
+}
 
 /// What the bytes of one file, of all files of a recording in one pass, or in all passes, may still inflate to.
 #[derive(Debug)]
@@ -32,8 +45,7 @@ pub struct Allowance {
 impl Allowance {
     /// Of a file of so many bytes, one of so many of a recording.
     pub(crate) fn of(bytes: u64, files: usize) -> Allowance {
-        let stated = std::env::var(FREE_VARIABLE).ok().and_then(|mib| mib.trim().parse::<u64>().ok());
-        let free = stated.map_or(FREE_BYTES, |mib| mib.saturating_mul(1 << 20)) / files.max(1) as u64;
+        let free = stated_bytes().unwrap_or(FREE_BYTES) / files.max(1) as u64;
         Allowance { bytes, free, passes: 1, left: AtomicU64::new(0), exceeded: AtomicBool::new(false) }.full()
     }
 

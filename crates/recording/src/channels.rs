@@ -1,5 +1,6 @@
 //! Channel and schema definitions of one file.
 
+use crate::budget::most_definition_bytes;
 use crate::foreign::DEFINITION_FROM;
 use crate::raw::{RawChannel, RawSchema};
 use crate::records::{Cursor, RawRecord};
@@ -8,8 +9,6 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
 
-/// What the texts of all definitions of a file may take in memory [bytes]: recorders write some megabytes at most.
-pub(crate) const MOST_BYTES: usize = 32 << 20;
 /// What an entry of the metadata of a channel takes besides its text [bytes].
 const ENTRY_BYTES: usize = 112;
 /// Longer metadata of a channel is none [bytes].
@@ -17,7 +16,7 @@ const MOST_METADATA_BYTES: usize = 1 << 20;
 
 /// Why a definition is not kept.
 const TOO_MANY: &str =
-    "its schemas and channels take more than the 32 MiB that they may; this one is not used";
+    "its schemas and channels take more than they may (32 MiB, or ARMCAL_INFLATE_MIB); this one is not used";
 /// Why two definitions cannot both be right.
 const OTHER: &str = "another definition of the same number than the one before";
 
@@ -182,7 +181,7 @@ impl Definitions {
 
 /// What is taken with so many bytes more.
 fn room(taken: usize, more: usize) -> Result<usize, &'static str> {
-    Some(taken + more).filter(|bytes| *bytes <= MOST_BYTES).ok_or(TOO_MANY)
+    Some(taken + more).filter(|bytes| *bytes <= most_definition_bytes()).ok_or(TOO_MANY)
 }
 
 impl RawSchema {

@@ -8,8 +8,7 @@ use super::copy::{Copy, no_room};
 use super::database::{Stored, compare_index, compare_log, compare_rows, failed, is_of_disk, quick_check};
 use super::definitions;
 use super::wal::{Frames, beside, frames, identity, logs_of};
-use crate::budget::Allowance;
-use crate::channels::MOST_BYTES as MOST_DEFINITION_BYTES;
+use crate::budget::{Allowance, FREE_VARIABLE, most_definition_bytes};
 use crate::{RecordingError, input};
 use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
@@ -129,7 +128,7 @@ fn add_topics(
             let (id, name, kind, format): (i64, String, String, String) =
                 (row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?);
             bytes += name.len() + kind.len() + format.len();
-            if bytes > MOST_DEFINITION_BYTES {
+            if bytes > most_definition_bytes() {
                 return Err(Stop::Endless);
             }
             let stored = of_bag.get(&kind).map(|(encoding, text)| (encoding.as_str(), text.as_str().into()));
@@ -154,7 +153,8 @@ fn add_topics(
             "its topics cannot be read ({e}); `sqlite3 IN .recover | sqlite3 OUT` may save it"
         )),
         Err(Stop::Endless) => refused(format!(
-            "its topics and message definitions take more than the {MOST_DEFINITION_BYTES} bytes that they may"
+            "its topics and message definitions take more than the {} MiB that they may ({FREE_VARIABLE} says more)",
+            most_definition_bytes() >> 20
         )),
     }
 }
@@ -168,7 +168,7 @@ fn stored_definitions(database: &Connection) -> Result<BTreeMap<String, (String,
     while let Some(row) = rows.next()? {
         let (kind, encoding, text): (String, String, String) = (row.get(0)?, row.get(1)?, row.get(2)?);
         bytes += kind.len() + encoding.len() + text.len();
-        if bytes > MOST_DEFINITION_BYTES {
+        if bytes > most_definition_bytes() {
             return Err(Stop::Endless);
         }
         all.insert(kind, (encoding, text));
