@@ -226,13 +226,14 @@ fn what_is_no_pipeline_is_named_for_what_it_is() {
     let world = World::new();
     world.write("old.bag", "#ROSBAG V2.0\nxxxxxxxxxxxxxx");
     world.write("new.db3", "SQLite format 3\0xxxxxxxxxxxxx");
+    std::fs::create_dir(world.path("plain")).expect("a folder");
     std::fs::write(world.path("odd.toml"), [0xff, 0xfe, b'n', 0]).expect("written");
     for (file, says) in [
         ("normal.mcap", "normal.mcap is a recording (MCAP), where a pipeline belongs"),
         ("normal.mcap", "armcal inspect normal.mcap"),
         ("old.bag", "old.bag is a ROS 1 bag, where a pipeline belongs: convert it with `mcap convert"),
         ("new.db3", "new.db3 is a rosbag2 database, where a pipeline belongs: name it under [[recordings]]"),
-        ("result", "result is a folder, where a pipeline belongs"),
+        ("plain", "plain is a folder, where a pipeline belongs"),
         ("odd.toml", "reading the pipeline odd.toml: it is not UTF-8 text"),
         ("none.toml", "reading the pipeline none.toml: No such file"),
     ] {

@@ -87,7 +87,10 @@ fn more_definitions_than_usual_are_kept_where_that_is_stated() {
     for k in 0..40_u16 {
         let schema =
             writer.add_schema(&format!("a/T{k}"), "ros2msg", &vec![b'#'; 1 << 20]).expect("a schema");
-        writer.add_channel(schema, &format!("/t{k}"), "cdr", &[].into()).expect("a channel");
+        let channel = writer.add_channel(schema, &format!("/t{k}"), "cdr", &[].into()).expect("a channel");
+        let header =
+            mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
+        writer.write_to_known_channel(&header, &[0; 8]).expect("a message");
     }
     writer.finish().expect("the end");
     drop(writer);

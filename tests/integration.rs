@@ -20,6 +20,9 @@ mod real_robots;
 /// Is a pipeline proposed from recordings alone as good as one written by hand, and honest about what it could not see?
 mod init;
 
+/// Do results of a finished run stand for its pipeline, to the same numbers, and only where they are of the same inputs?
+mod finished_results;
+
 /// Are joints and bodies found inside messages of types that nobody told armcal?
 mod init_fields;
 

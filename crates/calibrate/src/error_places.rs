@@ -1,7 +1,7 @@
 //! In which dwells errors are largest: the place in a session that a person would look at first.
 
 use armcal_core::{DwellId, Observation, listed};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Fewest dwells on either side of a comparison.
@@ -18,7 +18,7 @@ const GROSS: f64 = 5.0;
 const FEW: f64 = 0.1;
 
 /// Dwells in which the error is larger than elsewhere.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ErrorPlace {
     /// Which: `recording 2` (by its index), `shoulder from 10 to 25 deg`, `recording 1 dwell 96, recording 1 dwell 97`.
     pub place: String,

@@ -1,9 +1,9 @@
 //! Before against after on points that no fit saw, and what their interval says.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What an effect does to errors on groups the fit did not see.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Mean error without it [mm].
     pub before: f64,

@@ -1,10 +1,11 @@
 //! Mistakes of wiring, files, frames and units: what is checked before any physics.
 
 use crate::warning::{Severity, Stage, Warning};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// How sure a finding is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Certainty {
     /// Worth a look; the result may stand.
@@ -14,10 +15,10 @@ pub enum Certainty {
 }
 
 /// Something about the setup that contradicts the data.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SetupFinding {
     /// Stable machine-readable name, `kebab-case`: `joint-sign`.
-    pub code: &'static str,
+    pub code: Cow<'static, str>,
     /// The joint, stream, frame, board or recording it is about.
     pub subject: String,
     /// What was seen, what the change would do, and where to make it.
@@ -39,15 +40,15 @@ impl SetupFinding {
             Certainty::Possible => Severity::Notice,
             Certainty::Mistake => Severity::Inadequate,
         };
-        Warning::new(severity, Stage::Setup, self.code, self.subject.clone(), self.message.clone())
+        Warning::new(severity, Stage::Setup, self.code.clone(), self.subject.clone(), self.message.clone())
     }
 }
 
 /// A mistake that would leave no trace in these data: nobody can say whether it was made.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unseen {
     /// The code that the mistake would have.
-    pub code: &'static str,
+    pub code: Cow<'static, str>,
     /// What it would be about.
     pub subject: String,
     /// What was tried, and how one can tell.
@@ -68,7 +69,7 @@ impl Unseen {
 }
 
 /// What the checks of the setup found.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetupReport {
     /// Changes of the setup that were tried by a refit; 0 where the errors gave no reason to.
     pub tried: usize,
@@ -105,7 +106,7 @@ mod tests {
     #[test]
     fn what_is_only_possible_gives_way_to_physics_that_leaves_no_more() {
         let finding = |certainty, before_mm, after_mm| SetupFinding {
-            code: "board-pose",
+            code: "board-pose".into(),
             subject: "the board".to_owned(),
             message: String::new(),
             certainty,

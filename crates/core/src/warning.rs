@@ -1,9 +1,10 @@
 //! Warnings are data: collected by every stage, shown in terminal, page and MCAP alike.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// How much a warning matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// Worth knowing; the result stands.
@@ -26,7 +27,7 @@ impl Severity {
 }
 
 /// The stage of the story that noticed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
     /// Reading the file.
@@ -46,14 +47,14 @@ pub enum Stage {
 }
 
 /// Something the user should know, with what it is about and what to do.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Warning {
     /// How much it matters.
     pub severity: Severity,
     /// Who noticed.
     pub stage: Stage,
     /// Stable machine-readable name, `kebab-case`.
-    pub code: &'static str,
+    pub code: Cow<'static, str>,
     /// The file, channel, dwell, cavity or parameter it is about.
     pub subject: String,
     /// One sentence: what was seen, and what to do next.
@@ -65,11 +66,11 @@ impl Warning {
     pub fn new(
         severity: Severity,
         stage: Stage,
-        code: &'static str,
+        code: impl Into<Cow<'static, str>>,
         subject: impl Into<String>,
         message: impl Into<String>,
     ) -> Warning {
-        Warning { severity, stage, code, subject: subject.into(), message: message.into() }
+        Warning { severity, stage, code: code.into(), subject: subject.into(), message: message.into() }
     }
 }
 

@@ -5,13 +5,13 @@ use crate::events::moment;
 use crate::problem::{Candidate, DwellRow, Problem};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Fewest pairs that mean anything.
 const MIN_PAIRS: usize = 5;
 
 /// What pairs of visits to the same pose say about an effect, free of geometry.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contrast {
     /// What differs within a pair.
     pub differs: String,

@@ -52,7 +52,7 @@ impl Verdict {
 }
 
 /// The whole diagnosis.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// The answer.
     pub verdict: Verdict,
@@ -131,7 +131,7 @@ impl Diagnosis {
 }
 
 /// The bootstrap that a name must pass.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Gate {
     /// Sign-flipped copies of the data.
     pub resamplings: usize,
@@ -140,7 +140,7 @@ pub struct Gate {
 }
 
 /// Which errors a number is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JudgedOn {
     /// Points held out of the fit, predicted by a fit that never saw them.
@@ -163,7 +163,7 @@ impl JudgedOn {
 }
 
 /// Errors that nothing explains.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
     /// Mean error with everything found in the model [mm].
     pub error_mm: f64,
@@ -184,7 +184,7 @@ pub struct Unexplained {
 }
 
 /// What a diagnosis tried.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Tried {
     /// Effects of the catalogue, each at every target.
     pub listed: usize,
@@ -206,7 +206,7 @@ pub struct Refitted {
 }
 
 /// An error before and after [mm].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BeforeAfter {
     /// Without.
     pub before: f64,
@@ -215,7 +215,7 @@ pub struct BeforeAfter {
 }
 
 /// One effect that belongs in the model.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FoundEffect {
     /// Its most probable name.
     pub name: String,
@@ -247,7 +247,7 @@ pub struct FoundEffect {
 }
 
 /// What a found effect is preferred to.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rival {
     /// Its name.
     pub name: String,
@@ -260,7 +260,7 @@ pub struct Rival {
 }
 
 /// One amplitude with its interval, SI.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterReport {
     /// Name.
     pub name: String,
@@ -277,7 +277,7 @@ pub struct ParameterReport {
 }
 
 /// One entry of the catalogue, before it is added.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct CandidateReport {
     /// Name as the pipeline writes it.
     pub spec: String,
@@ -316,7 +316,7 @@ pub struct Standing {
 }
 
 /// An effect the data could not have shown.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NotTestable {
     /// Its name.
     pub effect: String,
@@ -329,7 +329,7 @@ pub struct NotTestable {
 }
 
 /// Structure without a listed cause.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct UnknownReport {
     /// Where it enters: `joint1`.
     pub channel: String,
@@ -369,7 +369,7 @@ pub struct Series {
 }
 
 /// A point of a shape, SI.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ShapePoint {
     /// Driver.
     pub at: f64,
@@ -380,7 +380,7 @@ pub struct ShapePoint {
 }
 
 /// An expression effect, ready to paste.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expression {
     /// Formula over q1.., s1.., tau1.., t, load, temperature and its own parameters.
     pub formula: String,
@@ -395,7 +395,7 @@ pub struct Expression {
 }
 
 /// One parameter of an expression.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExpressionParameter {
     /// Name.
     pub name: String,

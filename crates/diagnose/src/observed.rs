@@ -100,6 +100,13 @@ fn as_fitted(calibrated: &Calibrated<'_>) -> Result<Model, DiagnoseError> {
     Ok(model)
 }
 
+impl Diagnosis {
+    /// Fits what was found again, where it was read back from the results of a run.
+    pub fn refit(&mut self, calibrated: &Calibrated<'_>) {
+        self.refitted = refitted(calibrated, self).map(Box::new);
+    }
+}
+
 /// The model with everything that was found, on the same observations and hold-out. None where nothing was found, or
 /// where this hold-out leaves no way to fit it.
 fn refitted(calibrated: &Calibrated<'_>, diagnosis: &Diagnosis) -> Option<Refitted> {

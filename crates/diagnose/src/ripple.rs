@@ -1,7 +1,7 @@
 //! What repeats in a joint's error curve: the teeth, lines and pole pairs of what turns with it.
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Fewest periods that a joint must have gone through, and fewest in a turn: the first two harmonics are called by other
@@ -25,7 +25,7 @@ const STEP: f64 = 0.05;
 const MULTIPLES: usize = 3;
 
 /// A periodic part of an error curve over a joint's own angle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ripple {
     /// Periods in one turn of the joint.
     pub periods_per_turn: f64,

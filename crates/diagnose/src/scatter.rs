@@ -4,7 +4,7 @@ use crate::problem::{DwellRow, Problem};
 use crate::weigh::Weighed;
 use armcal_calibrate::tails::chi2_tail;
 use nalgebra::DVector;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A correlation at least so large, and so improbable by chance, is beyond doubt.
@@ -12,7 +12,7 @@ const CORRELATED: f64 = 0.2;
 pub(crate) const IMPROBABLE: f64 = 1e-3;
 
 /// The scatter of what a fit leaves, against what is declared.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scatter {
     /// Its standard deviation over the declared one.
     pub sigma_ratio: f64,
@@ -29,7 +29,7 @@ pub struct Scatter {
 }
 
 /// A correlation between errors of pairs of dwells.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Correlation {
     /// Its value.
     pub value: f64,

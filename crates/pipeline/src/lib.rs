@@ -13,4 +13,4 @@ mod settled;
 pub use diagnosed::{chosen_again, diagnose_again};
 pub use refits::add_refits;
 pub use run::{recalibrate, run};
-pub use settled::{Settled, run_of, settle};
+pub use settled::{Settled, run_of, settle, settle_again};

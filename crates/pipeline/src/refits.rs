@@ -4,7 +4,7 @@ use crate::diagnosed::{calibrated, chosen_again};
 use armcal_calibrate::{calibrate_beside, holdout_turns};
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_diagnose::ParameterReport;
+use armcal_diagnose::{Calibrated, Diagnosis, ParameterReport};
 use armcal_model::EffectSpec;
 use armcal_report::{Refit, Run};
 use armcal_stages::{RunError, Steps};
@@ -20,43 +20,37 @@ const REFITTED_OBSERVATIONS: usize = 4000;
 const CHOSEN_AGAIN_OBSERVATIONS: usize = 1000;
 const CHOSEN_AGAIN_PARTS: usize = 3;
 
-/// Makes the choice of what was found again without each part of the hold-out. The verdict stands without it: what stops
-/// it is said in its place.
-fn choose_again(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) {
-    let Some(mut diagnosis) = run.diagnosis.take_if(|_| !run.steps.is_empty()) else { return };
-    let poses = run.observations.len();
-    let parts =
-        holdout_turns(&run.model, &run.observations, &pipeline.holdout).map_or(0, |turns| turns.len());
-    if poses > CHOSEN_AGAIN_OBSERVATIONS || parts > CHOSEN_AGAIN_PARTS {
-        let any = if run.is_pool() { "" } else { "; `armcal add suggested` does it for any" };
-        let why = format!(
-            "a run does so for up to {CHOSEN_AGAIN_OBSERVATIONS} poses and {CHOSEN_AGAIN_PARTS} parts of the hold-out, here \
-             are {poses} and {parts}{any}"
-        );
-        diagnosis.not_chosen_again = Some(why);
-    } else {
-        match chosen_again(pipeline, &calibrated(run, pipeline), &diagnosis, progress) {
-            Ok(nested) => diagnosis.nested = nested,
-            Err(e) => diagnosis.not_chosen_again = Some(e.to_string()),
-        }
-    }
-    run.diagnosis = Some(diagnosis);
-}
-
-/// What the run's model would become: with what was found, and with each of the best candidates.
+/// What the model of a run would become: with what was found, and with each of the best candidates.
 pub fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) -> Result<(), RunError> {
-    add_steps(run, pipeline, progress)?;
-    choose_again(run, pipeline, progress);
-    progress.step("fitting the best candidates");
-    run.alternatives = alternatives(run, pipeline);
-    size_by_refits(run);
+    (run.steps, run.alternatives) = Default::default();
+    let Some(mut diagnosis) = run.diagnosis.take() else { return Ok(()) };
+    let calibrated = calibrated(run, pipeline);
+    let Refits { steps, alternatives, warnings } = sized_by_refits(&mut diagnosis, &calibrated, progress)?;
+    if !steps.is_empty() && diagnosis.nested.is_none() && diagnosis.not_chosen_again.is_none() {
+        choose_again(&mut diagnosis, pipeline, (&calibrated, run.is_pool()), progress);
+    }
+    (run.steps, run.alternatives, run.diagnosis) = (steps, alternatives, Some(diagnosis));
+    run.warnings.extend(warnings);
     Ok(())
 }
 
-/// Tells the sizes that the refits found, in place of those of one step from the model without them: far from it, where the
-/// errors are a thousand times the noise, a step is short.
-fn size_by_refits(run: &mut Run) {
-    let Some(mut diagnosis) = run.diagnosis.take() else { return };
+/// Models that a diagnosis proposes, fitted.
+pub(crate) struct Refits {
+    steps: Vec<Refit>,
+    alternatives: Vec<Refit>,
+    warnings: Vec<Warning>,
+}
+
+/// Fits what a diagnosis proposes, and tells the sizes that come out in place of those of one step from the model without
+/// them: far from it, where the errors are a thousand times the noise, a step is short.
+pub(crate) fn sized_by_refits(
+    diagnosis: &mut Diagnosis,
+    calibrated: &Calibrated<'_>,
+    progress: &dyn Steps,
+) -> Result<Refits, RunError> {
+    let (steps, warnings) = steps(diagnosis, calibrated, progress)?;
+    progress.step("fitting the best candidates");
+    let alternatives = alternatives(diagnosis, calibrated, &steps);
     let estimate = |refit: &Refit, name: &str| {
         let estimates = &refit.calibration.fit.estimates;
         estimates.iter().find(|e| e.parameter.name == name).map(|e| (e.value, e.ci95))
@@ -72,24 +66,53 @@ fn size_by_refits(run: &mut Run) {
         }
     };
     // What was found, by the model with all of it that has a name.
-    let named = run.steps.iter().find(|step| step.effects.len() == diagnosis.effects.len());
+    let named = steps.iter().find(|step| step.effects.len() == diagnosis.effects.len());
     for found in diagnosis.effects.iter_mut().filter(|found| found.combination.is_none()) {
         named.into_iter().for_each(|step| resize(step, &found.name, &mut found.parameters));
     }
     for candidate in &mut diagnosis.candidates {
         let is_of = |refit: &&Refit| refit.effects.join("+") == candidate.spec;
-        let refit = run.steps.iter().chain(&run.alternatives).find(is_of);
+        let refit = steps.iter().chain(&alternatives).find(is_of);
         refit.into_iter().for_each(|refit| resize(refit, &candidate.spec, &mut candidate.parameters));
     }
-    run.diagnosis = Some(diagnosis);
+    Ok(Refits { steps, alternatives, warnings })
 }
 
-/// Adds what the diagnosis found to the model, each time fitted anew: one named effect after the other, then all that has
-/// no name at once.
-fn add_steps(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) -> Result<(), RunError> {
-    run.steps.clear();
-    let Some(diagnosis) = &run.diagnosis else { return Ok(()) };
-    let found = diagnosis.suggested(run.model.chain().joint_names())?;
+/// Makes the choice of what was found again without each part of the hold-out. The verdict stands without it: what stops
+/// it is said in its place.
+fn choose_again(
+    diagnosis: &mut Diagnosis,
+    pipeline: &Pipeline,
+    (calibrated, is_pool): (&Calibrated<'_>, bool),
+    progress: &dyn Steps,
+) {
+    let poses = calibrated.observations.len();
+    let turns = holdout_turns(calibrated.model, calibrated.observations, calibrated.holdout);
+    let parts = turns.map_or(0, |turns| turns.len());
+    if poses > CHOSEN_AGAIN_OBSERVATIONS || parts > CHOSEN_AGAIN_PARTS {
+        let any = if is_pool { "" } else { "; `armcal add suggested` does it for any" };
+        let why = format!(
+            "a run does so for up to {CHOSEN_AGAIN_OBSERVATIONS} poses and {CHOSEN_AGAIN_PARTS} parts of the hold-out, here \
+             are {poses} and {parts}{any}"
+        );
+        diagnosis.not_chosen_again = Some(why);
+        return;
+    }
+    match chosen_again(pipeline, calibrated, diagnosis, progress) {
+        Ok(nested) => diagnosis.nested = nested,
+        Err(e) => diagnosis.not_chosen_again = Some(e.to_string()),
+    }
+}
+
+/// The model with what the diagnosis found, each time fitted anew: one named effect after the other, then all that has no name at
+/// once.
+fn steps(
+    diagnosis: &Diagnosis,
+    calibrated: &Calibrated<'_>,
+    progress: &dyn Steps,
+) -> Result<(Vec<Refit>, Vec<Warning>), RunError> {
+    let (mut steps, mut warnings) = (Vec::new(), Vec::new());
+    let found = diagnosis.suggested(calibrated.model.chain().joint_names())?;
     let named = diagnosis.effects.len().min(found.len());
     let mut counts: Vec<usize> = (1..=named).chain([found.len()]).collect();
     counts.dedup();
@@ -102,46 +125,46 @@ fn add_steps(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) -> Result
                 model: r.model.clone(),
                 calibration: r.calibration.clone(),
             }),
-            None => refit(run, pipeline, &found[..count]),
+            None => refit(calibrated, &found[..count]),
         };
         match step {
-            Ok(step) => run.steps.push(step),
+            Ok(step) => steps.push(step),
             // The verdict stands without it; only the picture of this step is missing.
             Err(e) => {
                 let message =
                     format!("the model with it cannot be fitted on this hold-out, so it is not shown: {e}");
                 let name = found[count - 1].to_string();
                 let code = "step-not-fitted";
-                run.warnings.push(Warning::new(Severity::Notice, Stage::Calibrate, code, name, message));
+                warnings.push(Warning::new(Severity::Notice, Stage::Calibrate, code, name, message));
                 break;
             }
         }
     }
-    Ok(())
+    Ok((steps, warnings))
 }
 
 /// The most probable candidates, each alone in the run's model; not those that are a step already.
 ///
 /// One that cannot be fitted on this hold-out has no refit; the ranking says what is known about it.
-fn alternatives(run: &Run, pipeline: &Pipeline) -> Vec<Refit> {
-    let Some(diagnosis) = &run.diagnosis else { return Vec::new() };
+fn alternatives(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>, steps: &[Refit]) -> Vec<Refit> {
     let members = |spec: &str| -> Vec<String> { spec.split('+').map(str::to_owned).collect() };
     let best = diagnosis.candidates.iter().map(|c| members(&c.spec));
     let [most, fewest] = ALTERNATIVES;
-    let count = (REFITTED_OBSERVATIONS / run.observations.len().max(1)).clamp(fewest, most);
+    let count = (REFITTED_OBSERVATIONS / calibrated.observations.len().max(1)).clamp(fewest, most);
     let wanted: Vec<Vec<String>> =
-        best.filter(|effects| run.steps.iter().all(|step| step.effects != *effects)).take(count).collect();
+        best.filter(|effects| steps.iter().all(|step| step.effects != *effects)).take(count).collect();
     let refit = |effects: &Vec<String>| {
-        let specs = effects.iter().map(|spec| run.model.effect(spec)).collect::<Result<Vec<_>, _>>().ok()?;
-        refit(run, pipeline, &specs).ok()
+        let specs =
+            effects.iter().map(|spec| calibrated.model.effect(spec)).collect::<Result<Vec<_>, _>>().ok()?;
+        refit(calibrated, &specs).ok()
     };
     wanted.par_iter().filter_map(refit).collect()
 }
 
-/// The run's model with more effects, calibrated on its observations.
-fn refit(run: &Run, pipeline: &Pipeline, effects: &[EffectSpec]) -> Result<Refit, RunError> {
-    let model = run.model.with_effects(effects, &run.session)?;
-    let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
-    let calibration = calibrate_beside(Some(&run.calibration), &model, &run.observations, fit, holdout)?;
+/// The calibrated model with more effects, on the same observations.
+fn refit(calibrated: &Calibrated<'_>, effects: &[EffectSpec]) -> Result<Refit, RunError> {
+    let Calibrated { model, calibration, observations, session, fit, holdout } = *calibrated;
+    let model = model.with_effects(effects, session)?;
+    let calibration = calibrate_beside(Some(calibration), &model, observations, fit, holdout)?;
     Ok(Refit { effects: effects.iter().map(EffectSpec::to_string).collect(), model, calibration })
 }

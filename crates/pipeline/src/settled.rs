@@ -1,13 +1,14 @@
 //! From recordings to a calibration whose setup was looked at, and what a report needs of it.
 
 use crate::diagnosed::{diagnosis, set_diagnosis};
+use crate::refits::sized_by_refits;
 use armcal_calibrate::Calibration;
 use armcal_config::Pipeline;
 use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
 use armcal_diagnose::{Diagnosis, Knowledge, Verdict};
 use armcal_model::{Model, Session};
 use armcal_recording::Recording;
-use armcal_report::{RecordingRun, Run, Undiagnosed};
+use armcal_report::{Conclusions, Grounds, RecordingRun, Run, Undiagnosed};
 use armcal_setup as setup;
 use armcal_stages::associated::Associated;
 use armcal_stages::{Fitted, Inputs, Rounds, RunError, Seen, Steps, fit_places, frames, perceive};
@@ -28,11 +29,23 @@ pub struct Settled {
     pub setup: SetupReport,
     /// The calibration on them.
     pub fitted: Fitted,
+    /// What an earlier run concluded from just this calibration.
+    pub concluded: Option<Conclusions>,
 }
 
 /// Reads the recordings, associates and calibrates in turn until every dwell stays in its place, and looks for mistakes
 /// in the setup.
 pub fn settle(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, RunError> {
+    settle_again(pipeline, None, progress)
+}
+
+/// The same where a finished run may have concluded what takes longest to find out: if it was from just this calibration, it
+/// is not looked for again.
+pub fn settle_again(
+    pipeline: &Pipeline,
+    concluded: Option<Conclusions>,
+    progress: &dyn Steps,
+) -> Result<Settled, RunError> {
     let (model_texts, chain) = frames::nominal_chain(pipeline)?;
     // What `[diagnosis]` says of the effects of the arm is understood before hours of work.
     Knowledge::of(&pipeline.diagnosis, chain.joint_names())?;
@@ -53,8 +66,19 @@ pub fn settle(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, RunE
     let fitted = fit_places(&inputs, &mut Told(progress));
     progress.step("checking the setup");
     let fitted = fitted.map_err(|source| without_setup(source, &inputs))?;
-    let setup = setup::examine(&inputs, &fitted);
-    Ok(Settled { recordings, model_texts, inputs, setup, fitted })
+    let grounds = Grounds {
+        pipeline_text: &pipeline.text,
+        model_texts: &model_texts,
+        board: inputs.board.as_ref(),
+        observations: &fitted.observations,
+        calibration: &fitted.calibration,
+    };
+    let concluded = concluded.filter(|earlier| earlier.are_of(&grounds));
+    let setup = match &concluded {
+        Some(earlier) => earlier.setup.clone(),
+        None => setup::examine(&inputs, &fitted),
+    };
+    Ok(Settled { recordings, model_texts, inputs, setup, fitted, concluded })
 }
 
 /// Tells which round begins.
@@ -85,7 +109,7 @@ impl Settled {
         self.setup.mistakes().next().map_or(Ok(()), |mistake| {
             Err(RunError::SetupFirst {
                 pipeline: self.inputs.pipeline.name.clone(),
-                code: mistake.code,
+                code: mistake.code.to_string(),
                 message: mistake.message.clone(),
             })
         })
@@ -97,7 +121,27 @@ impl Settled {
     /// A mistake of the setup, which would get the name of an effect; a diagnosis that cannot be made.
     pub fn diagnose(&self, pipeline: &Pipeline, progress: &dyn Steps) -> Result<Option<Diagnosis>, RunError> {
         self.refuse_mistakes()?;
-        diagnosis(pipeline, &self.fitted.calibrated(pipeline), progress)
+        let calibrated = self.fitted.calibrated(pipeline);
+        match &self.concluded {
+            Some(earlier) => Ok(Some(earlier.diagnosis_of(&calibrated))),
+            None => diagnosis(pipeline, &calibrated, progress),
+        }
+    }
+
+    /// The same with the sizes that refits give: what was concluded earlier has them.
+    ///
+    /// # Errors
+    /// As [`Settled::diagnose`].
+    pub fn diagnose_and_refit(
+        &self,
+        pipeline: &Pipeline,
+        progress: &dyn Steps,
+    ) -> Result<Option<Diagnosis>, RunError> {
+        let mut diagnosis = self.diagnose(pipeline, progress)?;
+        if let Some(diagnosis) = diagnosis.as_mut().filter(|_| self.concluded.is_none()) {
+            sized_by_refits(diagnosis, &self.fitted.calibrated(pipeline), progress)?;
+        }
+        Ok(diagnosis)
     }
 
     /// Everything for the report, with its diagnosis: whatever comes of that, the calibration stands. What it proposes is not

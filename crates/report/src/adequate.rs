@@ -19,7 +19,7 @@ pub(crate) fn as_wanted(run: &Run, mut warnings: Vec<Warning>) -> Vec<Warning> {
     let diagnosed = run.diagnosis.is_some();
     warnings.retain(|w| w.code != ABOVE_FLOOR || !diagnosed);
     let decides = |code: &str| run.wanted_mm.is_none() && (!diagnosed || code == UNEXPLAINED);
-    for warning in warnings.iter_mut().filter(|w| OF_SIZE.contains(&w.code) && !decides(w.code)) {
+    for warning in warnings.iter_mut().filter(|w| OF_SIZE.contains(&&*w.code) && !decides(&w.code)) {
         warning.severity = Severity::Notice;
     }
     warnings.extend(above_wanted(run));

@@ -18,6 +18,7 @@ mod by_marker;
 mod campaign;
 mod channels;
 mod comparison;
+mod conclusions;
 mod diagnosis_summary;
 mod diagnosis_text;
 mod error;
@@ -61,6 +62,7 @@ pub use campaign::{
     write_campaign,
 };
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
+pub use conclusions::{Conclusions, Grounds};
 pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis};
 pub use error::ReportError;
 pub use explanations::nested_sentence;

@@ -13,7 +13,7 @@ use std::collections::btree_map::Entry;
 use std::path::Path;
 
 /// Beginning of the names of armcal's attachments and metadata records.
-const OWN: &str = "armcal/";
+pub(crate) const OWN: &str = "armcal/";
 
 /// Name of the metadata record with names and hashes of the input files.
 pub(crate) const INPUT_METADATA: &str = "armcal/input";

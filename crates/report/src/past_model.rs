@@ -2,7 +2,7 @@
 
 use crate::PastRunError;
 use crate::ReportError;
-use crate::past_run::past_text;
+use crate::past_run::{attachment, past_text};
 use crate::run::{RecordingRun, Run, VERSION};
 use armcal_core::{DwellMark, FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{Chain, EffectSpec, EffectTable, Model};
@@ -10,8 +10,7 @@ use armcal_model_file::{
     ArmText, ChainText, FILE, FrameFacts, LengthFacts, MarkerFacts, PastModel, PlaceFacts, RecordingFacts,
     SCHEMA, Value,
 };
-use armcal_recording::{Recording, RecordingError};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Postures that are kept at most; a longer session is thinned out evenly.
 const MOST_POSTURES: usize = 400;
@@ -103,21 +102,8 @@ fn file(path: &Path) -> Result<String, PastRunError> {
 }
 
 fn attached(path: &Path) -> Result<String, PastRunError> {
-    let at = |source: RecordingError| PastRunError::Open { path: path.to_owned(), source: Box::new(source) };
-    let recording = Recording::open(&[PathBuf::from(path)]).map_err(at)?;
-    let name = format!("armcal/{FILE}");
-    let mut found = None;
-    recording
-        .for_each_attachment(&mut |a| {
-            if a.name == name && found.is_none() {
-                found = Some(String::from_utf8_lossy(a.data).into_owned());
-            }
-            Ok(())
-        })
-        .map_err(at)?;
-    let missing =
-        || PastRunError::NoModel { path: path.to_owned(), why: format!("it has no attachment {name}") };
-    found.ok_or_else(missing)
+    let why = || format!("it has no attachment armcal/{FILE}");
+    attachment(path, FILE)?.ok_or_else(|| PastRunError::NoModel { path: path.to_owned(), why: why() })
 }
 
 /// The files of the nominal arms; the ends of a URDF chain are what the pipeline says.

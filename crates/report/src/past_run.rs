@@ -1,7 +1,7 @@
 //! A run read back from its `run.mcap`: what comparing and re-reading need, without the recordings it came from.
 
 use crate::channels::parameter;
-use crate::mcap_file::INPUT_METADATA;
+use crate::mcap_file::{INPUT_METADATA, OWN};
 use crate::run::{RecordingRun, Run, effects};
 use crate::{DwellMark, proto};
 use armcal_calibrate::Residual;
@@ -11,6 +11,10 @@ use prost::Message as _;
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+/// Names of files of a run.
+pub(crate) const RUN: &str = "run.mcap";
+pub(crate) const SUMMARY: &str = "summary.json";
 
 /// Results of an earlier run.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,6 +118,30 @@ pub(crate) fn past_text(
     })
 }
 
+/// The `run.mcap` that a path means: itself, or that in the folder.
+pub(crate) fn run_file(path: &Path) -> PathBuf {
+    if path.is_dir() { path.join(RUN) } else { path.to_owned() }
+}
+
+/// The text that armcal attached to a `run.mcap` by this name.
+pub(crate) fn attachment(path: &Path, name: &str) -> Result<Option<String>, PastRunError> {
+    let at = |source| PastRunError::Open { path: path.to_owned(), source: Box::new(source) };
+    let recording = Recording::open(&[path.to_owned()]).map_err(at)?;
+    attached(&recording, name).map_err(at)
+}
+
+/// The same of one that is open.
+fn attached(recording: &Recording, name: &str) -> Result<Option<String>, RecordingError> {
+    let mut found = None;
+    recording.for_each_attachment(&mut |a| {
+        if found.is_none() && a.name.strip_prefix(OWN) == Some(name) {
+            found = Some(String::from_utf8_lossy(a.data).into_owned());
+        }
+        Ok(())
+    })?;
+    Ok(found)
+}
+
 impl PastRun {
     /// A run that has just finished, as it would be read back.
     pub fn of(run: &Run) -> PastRun {
@@ -143,7 +171,7 @@ impl PastRun {
 
     /// Reads `run.mcap`, given itself or the folder it is in.
     pub fn open(path: &Path) -> Result<PastRun, PastRunError> {
-        let path = if path.is_dir() { path.join("run.mcap") } else { path.to_owned() };
+        let path = run_file(path);
         let at = |source| PastRunError::Open { path: path.clone(), source: Box::new(source) };
         let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
         let mut residuals = Vec::new();
@@ -167,15 +195,7 @@ impl PastRun {
         if residuals.is_empty() {
             return Err(missing("/armcal/residuals"));
         }
-        let mut summary = None;
-        recording
-            .for_each_attachment(&mut |a| {
-                if a.name == "armcal/summary.json" && summary.is_none() {
-                    summary = serde_json::from_slice(a.data).ok();
-                }
-                Ok(())
-            })
-            .map_err(at)?;
+        let summary = attached(&recording, SUMMARY).map_err(at)?;
         let inputs = recording.metadata().map_err(at)?;
         Ok(PastRun {
             recordings: recordings(&inputs, &dwells),
@@ -183,7 +203,7 @@ impl PastRun {
             effects: report.effects,
             residuals: residuals.into_iter().map(PastResidual::from).collect(),
             parameters: parameters.into_iter().flat_map(|p| p.parameters).collect(),
-            summary: summary.unwrap_or_default(),
+            summary: summary.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default(),
             path,
         })
     }

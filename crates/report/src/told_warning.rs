@@ -8,7 +8,7 @@ use armcal_core::{Severity, Warning};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ToldWarning {
     pub severity: Severity,
-    pub code: &'static str,
+    pub code: String,
     /// What it is about, behind the name of its recording where it is about one.
     pub subject: String,
     pub message: String,
@@ -21,7 +21,7 @@ impl ToldWarning {
         let of = recording.map_or_else(String::new, |name| format!("{}: ", printable(name)));
         ToldWarning {
             severity: w.severity,
-            code: w.code,
+            code: w.code.to_string(),
             subject: of + &words(&w.subject),
             message: words(&w.message),
         }

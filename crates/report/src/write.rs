@@ -1,5 +1,6 @@
 //! All files of a run, in one folder.
 
+use crate::conclusions::{self, Conclusions};
 use crate::findings::Findings;
 use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
@@ -8,6 +9,7 @@ use crate::page::{Basis, PageKind, report_html};
 use crate::parameters::parameters_toml;
 use crate::past_model;
 use crate::past_observations::{OBSERVATIONS_FILE, observations_json};
+use crate::past_run::{RUN, SUMMARY};
 use crate::points::points;
 use crate::pool_json::{self, pool_json};
 use crate::tables::{self, parquet_files};
@@ -18,10 +20,8 @@ use armcal_recording::{Recording, RecordingError, make_folder};
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-pub(crate) const RUN: &str = "run.mcap";
 /// The page.
 pub(crate) const REPORT: &str = "report.html";
-const SUMMARY: &str = "summary.json";
 const PARAMETERS: &str = "parameters.toml";
 /// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
 pub(crate) const LAYOUT: &str = "foxglove-layout.json";
@@ -93,6 +93,13 @@ pub fn write_all(
     let of_models =
         models.iter().map(|ModelFile { name, media_type, text, .. }| Attachment { name, media_type, text });
     attachments.splice(4..4, of_models);
+    let concluded = Conclusions::of(run).map(|conclusions| conclusions.text()).transpose()?;
+    let of_search = concluded.iter().map(|text| Attachment {
+        name: conclusions::FILE,
+        media_type: "application/toml",
+        text,
+    });
+    attachments.extend(of_search);
     let to_copy = config.copied(recordings);
     let mcap_path = out_dir.join(RUN);
     let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);

@@ -37,7 +37,7 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
     let before_m = together.calibration.judged().fitted.mean_m;
     let names = [&inputs.seen[k].name, &inputs.seen[k + 1].name];
     Some(SetupFinding {
-        code: "frame-moved",
+        code: "frame-moved".into(),
         subject: format!("recordings `{}` and `{}`", names[0], names[1]),
         message: format!(
             "each recording fits by itself (mean error {} mm), all together leave {} mm: between `{}` and `{}` the \

@@ -1,13 +1,18 @@
 //! Hypotheses fitted: each change, and of a change that holds a number the value that fits best.
 
 use super::hypotheses::{Freedom, Hypothesis, Number};
-use super::trial::{Misfit, Trial, misfit};
-use super::weigh::SAME_FACTOR;
-use armcal_stages::{Fitted, Inputs, fit_places};
+use super::trial::{Misfit, misfit};
+use super::weigh::{SAME_FACTOR, could_explain};
+use armcal_core::Observation;
+use armcal_stages::{Fitted, Inputs, Rounds, fit_places};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 
 /// Steps of a search between two neighbours.
 const REFINEMENTS: usize = 10;
+
+/// Share of all dwells for which later rounds may find places, and hardly ever do.
+const MORE_LATER: f64 = 0.25;
 
 /// A hypothesis and how well the inputs fit with it.
 pub struct Tried {
@@ -80,6 +85,31 @@ fn refined(now: &Inputs, before: &Misfit, tried: Tried) -> Tried {
         }
     }
     best
+}
+
+/// The rounds of a trial, which end where nothing more could come of it.
+struct Trial<'a> {
+    /// What is fitted.
+    inputs: &'a Inputs,
+    /// The misfit that it must explain.
+    before: &'a Misfit,
+}
+
+impl Rounds for Trial<'_> {
+    fn is_worth_fitting(&mut self, observations: &[Observation]) -> bool {
+        let total = self.inputs.dwells().count() as f64;
+        let used: BTreeSet<_> = observations.iter().map(|o| o.dwell).collect();
+        // A later round may find places for more.
+        let most = used.len() as f64 + MORE_LATER * total;
+        let least_log = (total - most).max(0.0) / total.max(1.0) * Misfit::of_nothing().log;
+        most >= self.before.used as f64 || could_explain(self.before, least_log)
+    }
+
+    fn goes_on(&mut self, fitted: &Fitted) -> bool {
+        let now = misfit(self.inputs, fitted);
+        let seats = now.seated > self.before.seated;
+        seats || now.of_spread() < self.before.of_spread() || now.log < self.before.log
+    }
 }
 
 /// A hypothesis, fitted as far as it could still explain what is left without it.

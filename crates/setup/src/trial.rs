@@ -1,11 +1,10 @@
 //! One trial: the inputs of a calibration, one of them changed, fitted quickly, and how badly that fits.
 
 use super::spread::spread_m;
-use super::weigh::could_explain;
 use armcal_calibrate::{HoldoutConfig, Objective};
-use armcal_core::{Observation, Parameter};
+use armcal_core::Parameter;
 use armcal_stages::associated::Associated;
-use armcal_stages::{Change, Fitted, Inputs, Rounds};
+use armcal_stages::{Change, Fitted, Inputs};
 use armcal_table::Place;
 use std::collections::BTreeSet;
 
@@ -19,9 +18,6 @@ const MOST_ROUNDS: usize = 3;
 const CURVE: &str = "error_curve";
 /// Dwells that take part in trials; of more, as many are drawn evenly over time.
 const MOST_DWELLS: usize = 150;
-
-/// Share of all dwells for which later rounds may find places, and hardly ever do.
-const MORE_LATER: f64 = 0.25;
 
 /// How badly inputs fit.
 #[derive(Debug, Clone, Copy)]
@@ -108,31 +104,6 @@ pub fn for_trials(inputs: &Inputs, calibrated: Option<&Fitted>) -> Inputs {
         }
     }
     inputs
-}
-
-/// The rounds of a trial, which end where nothing more could come of it.
-pub struct Trial<'a> {
-    /// What is fitted.
-    pub inputs: &'a Inputs,
-    /// The misfit that it must explain.
-    pub before: &'a Misfit,
-}
-
-impl Rounds for Trial<'_> {
-    fn is_worth_fitting(&mut self, observations: &[Observation]) -> bool {
-        let total = self.inputs.dwells().count() as f64;
-        let used: BTreeSet<_> = observations.iter().map(|o| o.dwell).collect();
-        // A later round may find places for more.
-        let most = used.len() as f64 + MORE_LATER * total;
-        let least_log = (total - most).max(0.0) / total.max(1.0) * saturating(CAP);
-        most >= self.before.used as f64 || could_explain(self.before, least_log)
-    }
-
-    fn goes_on(&mut self, fitted: &Fitted) -> bool {
-        let now = misfit(self.inputs, fitted);
-        let seats = now.seated > self.before.seated;
-        seats || now.of_spread() < self.before.of_spread() || now.log < self.before.log
-    }
 }
 
 /// How badly a fit of these inputs fits.

@@ -86,7 +86,7 @@ pub fn finding(
     };
     let ends = moved.unwrap_or_else(|| after.fitted.map_or(String::new(), |f| estimated(h, &f.calibration)));
     SetupFinding {
-        code: h.code,
+        code: h.code.into(),
         subject: h.subject.clone(),
         message: format!("with {together}{or} {gain}{ends}; {}", h.remedy),
         certainty: Certainty::Mistake,

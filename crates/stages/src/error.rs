@@ -72,7 +72,7 @@ pub enum RunError {
     #[error(
         "the setup of `{pipeline}` contradicts the data, so no physical effect is looked for [{code}]: {message}"
     )]
-    SetupFirst { pipeline: String, code: &'static str, message: String },
+    SetupFirst { pipeline: String, code: String, message: String },
 }
 
 impl RunError {

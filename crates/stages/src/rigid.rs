@@ -219,7 +219,7 @@ mod tests {
         knock(&mut all, "a", 19..20);
         let before = all.clone();
         let said = reject(&arm(&names), &mut all);
-        let told: Vec<(&str, &str)> = said.iter().map(|w| (w.code, w.subject.as_str())).collect();
+        let told: Vec<(&str, &str)> = said.iter().map(|w| (&*w.code, w.subject.as_str())).collect();
         assert_eq!(told, [("marker-rejected", "marker a"), ("marker-rejected", "marker b")]);
         assert!(said[1].message.starts_with("rejected in dwell 7:"), "{}", said[1].message);
         assert!(
@@ -235,7 +235,7 @@ mod tests {
         knock(&mut all, "a", 7..8);
         let before = all.clone();
         let said = reject(&arm(&names), &mut all);
-        assert_eq!((said.len(), said[0].code), (1, "marker-distance"));
+        assert_eq!((said.len(), &*said[0].code), (1, "marker-distance"));
         assert!(
             said[0].subject == "markers tip and a" && said[0].message.contains("in dwell 7:"),
             "{said:?}"

@@ -139,7 +139,7 @@ pub struct Told {
     /// How much it matters.
     pub severity: Severity,
     /// Its stable name.
-    pub code: &'static str,
+    pub code: String,
     /// A sentence.
     pub text: String,
 }
@@ -148,7 +148,7 @@ pub struct Told {
 pub fn all_warnings(run: &Run) -> Vec<Told> {
     let told = |w: &Warning, text: String| Told {
         severity: w.severity,
-        code: w.code,
+        code: w.code.to_string(),
         text: run.in_words(&printable(&text)),
     };
     let of_recordings = run

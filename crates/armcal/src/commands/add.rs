@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::extended::{extend, set_of};
 use crate::progress::Progress;
 use crate::transfer::{LeftOut, Transfer, transfers};
-use crate::view;
+use crate::view::{self, Given};
 use armcal_config::Pipeline;
 use armcal_core::listed;
 use armcal_diagnose::{Diagnosis, Nested};
@@ -29,7 +29,7 @@ pub struct Request {
     /// Effects such as backlash:1 (see `armcal effects`), or `suggested` for what the diagnosis found.
     #[arg(required = true)]
     pub effects: Vec<String>,
-    /// Pipeline file to extend.
+    /// Pipeline file to extend, or the results of its run (their folder or run.mcap): what these concluded is not looked for again.
     pub pipeline: PathBuf,
     /// File for the extended pipeline; beside the original when absent.
     #[arg(long)]
@@ -54,19 +54,21 @@ struct Chosen {
 
 /// Refits with the effects, compares on held-out points, diagnoses what remains, writes pipeline and results.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load(&request.pipeline)?;
+    let given = Given::alone(&request.pipeline)?;
+    let path = given.pipeline;
+    let pipeline = Pipeline::load(&path)?;
     may_write(results(&pipeline, &request.out))?;
     let named = named(&request.effects, &pipeline)?;
     if let Some(new) = &named {
-        extend(&pipeline, &request.pipeline, request.write.as_deref(), (new, &[]))?;
+        extend(&pipeline, &path, request.write.as_deref(), (new, &[]))?;
     }
     let progress = Progress::new();
-    let settled = armcal_pipeline::settle(&pipeline, &progress)?;
+    let settled = armcal_pipeline::settle_again(&pipeline, given.concluded, &progress)?;
     let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     let Chosen { new, sets, transfer, left_out, nested } =
         chosen(named, &pipeline, &settled, &effects, &progress)?;
-    let extended = extend(&pipeline, &request.pipeline, request.write.as_deref(), (&new, &sets))?;
+    let extended = extend(&pipeline, &path, request.write.as_deref(), (&new, &sets))?;
 
     progress.step("calibrating without and with");
     effects.extend(new.iter().cloned());
@@ -106,7 +108,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
             None => name.clone(),
         };
         let added = run.in_words(&added.iter().map(one_of).collect::<Vec<_>>().join(", "));
-        print(&format!("Added {added} to {}\n\n", request.pipeline.display()))?;
+        print(&format!("Added {added} to {}\n\n", path.display()))?;
         for LeftOut { effect, reason } in &left_out {
             print(&format!("Left out: {}: {reason}\n\n", run.in_words(effect)))?;
         }
@@ -152,6 +154,7 @@ fn chosen(
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let joints = geometry.chain().joint_names();
     let nested = match &diagnosis {
+        Some(found) if found.nested.is_some() => found.nested.clone(),
         Some(found) => {
             armcal_pipeline::chosen_again(pipeline, &settled.fitted.calibrated(pipeline), found, progress)?
         }

@@ -4,6 +4,7 @@ use super::{Outcome, joint_range, print};
 use crate::error::Error;
 use crate::plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
 use crate::progress::Progress;
+use crate::view::Given;
 use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_config::Pipeline;
 use armcal_core::Arrival;
@@ -22,7 +23,7 @@ const UNSEEN_SIGMA_M: f64 = 3e-4;
 /// What `armcal plan` is asked to do.
 #[derive(Debug, Clone, Args)]
 pub struct Request {
-    /// Pipeline file.
+    /// Pipeline file, or the results of its run (their folder or run.mcap): what these concluded is not looked for again.
     pub pipeline: PathBuf,
     /// Most dwells to propose.
     #[arg(long, default_value_t = 6)]
@@ -47,7 +48,8 @@ pub struct Request {
 
 /// Calibrates, diagnoses, and proposes the dwells that tell apart what stands.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
-    let pipeline = Pipeline::load(&request.pipeline)?;
+    let given = Given::alone(&request.pipeline)?;
+    let pipeline = Pipeline::load(&given.pipeline)?;
     let (_, chain) = frames::nominal_chain(&pipeline)?;
     let joints = chain.joint_names();
     let allowed = allowed(request, joints)?;
@@ -56,8 +58,8 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         EffectSpec::parse(word, joints).map_err(Error::of_usage)?;
     }
     let progress = Progress::new();
-    let settled = armcal_pipeline::settle(&pipeline, &progress)?;
-    let diagnosis = settled.diagnose(&pipeline, &progress)?;
+    let settled = armcal_pipeline::settle_again(&pipeline, given.concluded, &progress)?;
+    let diagnosis = settled.diagnose_and_refit(&pipeline, &progress)?;
     let open = match (&words, &diagnosis) {
         (Some(words), _) => named(words, diagnosis.as_ref(), joints)?,
         (None, Some(diagnosis)) => standing(diagnosis, joints)?,

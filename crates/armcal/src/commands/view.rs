@@ -3,16 +3,17 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::view::{Bench, serve, source_of};
+use crate::view::{Bench, Given, serve};
 use armcal_recording::input::{Kind, read_to_string};
 use armcal_report::summary_json;
 use std::path::Path;
 
 /// Runs the pipeline behind `input` and serves its report until the user stops it.
 pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
-    let (path, results) = source_of(input)?;
+    let given = Given::by(input)?;
+    let path = given.pipeline.clone();
     let progress = Progress::new();
-    let bench = Bench::of(&path, &results, &progress)?;
+    let bench = Bench::of(given, &progress)?;
     progress.finish();
     let written = read_to_string(&input.join("summary.json"), Kind::Data);
     let now = summary_json(bench.run())?;

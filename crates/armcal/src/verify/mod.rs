@@ -119,7 +119,7 @@ fn of_recording(seen: &Seen) -> Vec<Warning> {
     let named = |w: &Warning| {
         let subject = format!("{}: {}", seen.name, w.subject);
         // Dwell detection knows the nominal arm only, whose errors look like those of a clock.
-        if !OF_NOMINAL_CLOCK.contains(&w.code) {
+        if !OF_NOMINAL_CLOCK.contains(&&*w.code) {
             return Warning { subject, ..w.clone() };
         }
         let message = format!(

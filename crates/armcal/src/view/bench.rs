@@ -1,6 +1,7 @@
 //! A run on the workbench: every question of the page is a refit of its observations.
 
 use super::requests::{Choices, Wanted};
+use super::source::Given;
 use crate::error::Error;
 use crate::extended::extend;
 use crate::pool::{self, Pooled};
@@ -12,7 +13,7 @@ use armcal_model::{EffectSpec, Model, catalogue};
 use armcal_recording::atomic;
 use armcal_report::{Basis, PageKind, Refit, Run, refit_json, report_html};
 use armcal_stages::frames;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// A finished run, ready to be refitted.
@@ -29,25 +30,26 @@ pub struct Bench {
 
 impl Bench {
     /// Runs a pipeline, or pools `results` with it; what comes of it stays in memory.
-    pub fn of(path: &Path, results: &[PathBuf], progress: &Progress) -> Result<Bench, Error> {
-        let (pipeline, geometry, run) = match results {
+    pub fn of(given: Given, progress: &Progress) -> Result<Bench, Error> {
+        let Given { pipeline: path, results, concluded } = given;
+        let (pipeline, geometry, run) = match &results[..] {
             [] => {
-                let pipeline = Pipeline::load(path)?;
-                let settled = armcal_pipeline::settle(&pipeline, progress)?;
+                let pipeline = Pipeline::load(&path)?;
+                let settled = armcal_pipeline::settle_again(&pipeline, concluded, progress)?;
                 let geometry = settled.fitted.geometry.clone();
                 let (mut run, _) = settled.diagnosed(&pipeline, progress);
                 armcal_pipeline::add_refits(&mut run, &pipeline, progress)?;
                 (pipeline, geometry, run)
             }
             results => {
-                let pipeline = Pipeline::load_for_others(path)?;
+                let pipeline = Pipeline::load_for_others(&path)?;
                 let Pooled { run, geometry } = pool::run(&pipeline, results, progress)?;
                 (pipeline, geometry, run)
             }
         };
         let own = frames::effect_specs(&pipeline, &geometry)?;
         let basis = Basis::of(&run);
-        Ok(Bench { pipeline, path: path.to_owned(), geometry, own, run, basis })
+        Ok(Bench { pipeline, path, geometry, own, run, basis })
     }
 
     /// The run.

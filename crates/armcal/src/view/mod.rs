@@ -16,4 +16,4 @@ mod turns;
 pub use bench::Bench;
 pub use server::serve;
 pub(crate) use source::FILE as SOURCE_FILE;
-pub use source::{remember, source_of};
+pub use source::{Given, remember};

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use armcal_recording::{atomic, input};
+use armcal_report::Conclusions;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -28,12 +29,52 @@ pub fn remember(out: &Path, pipeline: &Path, results: &[PathBuf]) -> Result<(), 
     atomic::write(&out.join(FILE), text.as_bytes()).map_err(Error::Output)
 }
 
-/// The pipeline behind a folder of results, and the results that it pools; a pipeline file is itself.
-pub fn source_of(input: &Path) -> Result<(PathBuf, Vec<PathBuf>), Error> {
-    if input.extension().is_some_and(|e| e == "toml") {
-        return Ok((input.to_owned(), Vec::new()));
+/// A pipeline to work on, named by its file or by the results that it gave.
+pub struct Given {
+    /// The pipeline file.
+    pub pipeline: PathBuf,
+    /// The results that it pools.
+    pub results: Vec<PathBuf>,
+    /// What the run concluded whose results were named.
+    pub concluded: Option<Conclusions>,
+}
+
+impl Given {
+    /// By a pipeline file, a `run.mcap`, or its folder.
+    pub fn by(input: &Path) -> Result<Given, Error> {
+        let (pipeline, results) = source_of(input)?;
+        let concluded = if pipeline == input { None } else { Conclusions::open(input)? };
+        Ok(Given { pipeline, results, concluded })
     }
-    let path = input.join(FILE);
+
+    /// The same of what is no pool. What has no note of its pipeline is read as one, to be refused for what it is.
+    pub fn alone(input: &Path) -> Result<Given, Error> {
+        if folder_of(input).is_none_or(|folder| !folder.join(FILE).exists()) {
+            return Ok(Given { pipeline: input.to_owned(), results: Vec::new(), concluded: None });
+        }
+        let given = Given::by(input)?;
+        if given.results.is_empty() {
+            return Ok(given);
+        }
+        let problem =
+            "it pools other results, and this is asked of a pipeline with recordings; name one".to_owned();
+        Err(Error::Result { path: input.to_owned(), problem })
+    }
+}
+
+/// The folder of results that a path means, if it does: itself, or that of a `run.mcap`.
+fn folder_of(input: &Path) -> Option<&Path> {
+    match input.is_dir() {
+        // Where a pipeline is meant it is refused as a folder.
+        true => Some(input).filter(|_| input.extension().is_none_or(|e| e != "toml")),
+        false => input.parent().filter(|_| input.file_name().is_some_and(|name| name == "run.mcap")),
+    }
+}
+
+/// The pipeline behind results, and the results that it pools; a pipeline file is itself.
+fn source_of(input: &Path) -> Result<(PathBuf, Vec<PathBuf>), Error> {
+    let Some(folder) = folder_of(input) else { return Ok((input.to_owned(), Vec::new())) };
+    let path = folder.join(FILE);
     let unknown = |why: String| Error::Result {
         path: input.to_owned(),
         problem: format!(
@@ -42,5 +83,5 @@ pub fn source_of(input: &Path) -> Result<(PathBuf, Vec<PathBuf>), Error> {
     };
     let text = input::read_to_string(&path, input::Kind::Data).map_err(|e| unknown(e.to_string()))?;
     let source: Source = toml::from_str(&text).map_err(|e| unknown(e.to_string()))?;
-    Ok((input.join(source.pipeline), source.results.iter().map(|r| input.join(r)).collect()))
+    Ok((folder.join(source.pipeline), source.results.iter().map(|r| folder.join(r)).collect()))
 }

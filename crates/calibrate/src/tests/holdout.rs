@@ -169,10 +169,10 @@ fn what_a_turn_leaves_out_it_is_less_certain_of() {
 #[test]
 fn errors_above_twice_the_floor_are_inadequate_whatever_the_scatter_says() {
     let (model, observations) = tracked();
-    let grave = |observations: &[Observation]| -> (Vec<&'static str>, Calibration) {
+    let grave = |observations: &[Observation]| -> (Vec<std::borrow::Cow<'static, str>>, Calibration) {
         let c = run(&model, observations, "kind = \"cavity-folds\"\nk = 8").unwrap();
         let grave = c.warnings.iter().filter(|w| w.severity == armcal_core::Severity::Inadequate);
-        (grave.map(|w| w.code).collect(), c)
+        (grave.map(|w| w.code.clone()).collect(), c)
     };
     assert!(grave(&observations).0.is_empty());
     let erring = |from: usize, by_m: f64| {

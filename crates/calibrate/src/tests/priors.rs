@@ -147,7 +147,7 @@ fn from_above_priors_are_learnt_alike_wherever_they_begin() {
             assert!((begun / alone - 1.0).abs() < 0.02, "{begun} and {alone}");
             assert!((a.value - b.value).abs() < 0.01 * a.sigma, "{}", a.parameter.name);
         }
-        let codes = [&alone, &begun].map(|fit| fit.warnings.iter().map(|w| w.code).collect::<Vec<_>>());
+        let codes = [&alone, &begun].map(|fit| fit.warnings.iter().map(|w| &*w.code).collect::<Vec<_>>());
         assert_eq!(codes[0], codes[1]);
         assert!(codes[0].contains(&"priors-learnt"), "{codes:?}");
     }

@@ -123,10 +123,10 @@ fn codes(d: &Diagnosis) -> Vec<&str> {
     codes_of(&d.warnings)
 }
 
-fn codes_of(warnings: &[Warning]) -> Vec<&'static str> {
+fn codes_of(warnings: &[Warning]) -> Vec<&str> {
     warnings
         .iter()
-        .map(|w| w.code)
+        .map(|w| &*w.code)
         .filter(|c| ["unexplained", "holdout-errs-more", "of-refit"].contains(c))
         .collect()
 }

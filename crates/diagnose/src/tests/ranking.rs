@@ -118,3 +118,38 @@ fn several_effects_have_a_row_for_each_that_could_stand_in_the_place_of_one() {
         assert!(behind.is_clear(10.0) && s.probability == 0.0, "{name} alone is {behind:?} behind");
     }
 }
+
+#[test]
+fn shares_of_several_effects_multiply() {
+    use crate::search::search;
+    use crate::settle::{Scored, settle};
+    use crate::tests::{entry, in_rooms, room as first_room};
+    let (p, config) = (planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3), quick());
+    let base = first_room(&p, &config);
+    in_rooms(&p, &config, |rooms| {
+        let mut found = search(rooms, &[], &config).unwrap();
+        settle(&mut found, rooms, &config).unwrap();
+        assert_eq!(found.accepted.len(), 2);
+        let shares = [("backlash:3", 0.75, 0.2, 0.05), ("zero_drift:3", 0.5, 0.4, 0.1)];
+        for (a, (other, own, share, nothing)) in found.accepted.iter_mut().zip(shares) {
+            let score = a.judged.score.clone();
+            let what = [
+                (Instead::Entry(a.judged.entry), own),
+                (Instead::Entry(entry(&a.room.weighed, other)), share),
+                (Instead::Nothing, nothing),
+            ];
+            a.ranked = what.map(|(what, weight)| Scored { what, score: score.clone(), weight }).to_vec();
+        }
+        let names: Vec<String> = found.accepted.iter().map(|a| a.candidate.spec.clone()).collect();
+        let ranking = Ranking::of_answer(&found.accepted, &base, rooms, &config);
+        let of = |first: &str, second: &str| {
+            let row = ranking.explanations.iter().find(|e| e.effects == [first, second]).unwrap();
+            row.standing.probability
+        };
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        near(of(&names[0], &names[1]), 0.75 * 0.5);
+        near(of("backlash:3", &names[1]), 0.2 * 0.5);
+        near(of(&names[0], "zero_drift:3"), 0.75 * 0.4);
+        near(ranking.p_nothing, 0.05 * 0.1);
+    });
+}

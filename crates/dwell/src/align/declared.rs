@@ -49,7 +49,7 @@ pub(super) fn align(
             alignment.displacement_ratio = found.displacement_ratio;
             // What is said of an estimate that is not used is no matter.
             let about_the_data =
-                |w: &Warning| ["clock-displacement-ratio", "clock-not-linear"].contains(&w.code);
+                |w: &Warning| ["clock-displacement-ratio", "clock-not-linear"].contains(&&*w.code);
             let mut warnings: Vec<Warning> = said.into_iter().filter(about_the_data).collect();
             warnings.extend(contradiction(&alignment, &found, first_ns, last_ns));
             Ok((alignment, warnings))

@@ -210,7 +210,7 @@ fn bad_rows_are_counted_and_time_comes_out_increasing() {
     assert_eq!((r.duplicate_stamps, r.backward_stamps, r.rows), (1, 1, 498));
     assert!(samples.joints.time_ns.windows(2).all(|w| w[0] < w[1]));
     let lost: Vec<&str> =
-        warnings.iter().filter(|w| w.severity == Severity::DataLost).map(|w| w.code).collect();
+        warnings.iter().filter(|w| w.severity == Severity::DataLost).map(|w| &*w.code).collect();
     assert_eq!(lost, ["undecodable", "non-finite"]);
 }
 

@@ -137,7 +137,7 @@ fn warnings(campaign: &Campaign) -> Vec<ToldWarning> {
         }
     }
     let told = |((Reverse(severity), text), recordings): ((Reverse<Severity>, &str), Vec<String>)| {
-        ToldWarning { severity, code: "", subject: listed(&recordings), message: printable(text) }
+        ToldWarning { severity, code: String::new(), subject: listed(&recordings), message: printable(text) }
     };
     all.into_iter().map(told).collect()
 }

@@ -148,7 +148,7 @@ fn possible(code: &'static str, subject: String, message: String) -> SetupFindin
 fn mistake(code: &'static str, subject: String, message: String) -> SetupFinding {
     let certainty = Certainty::Mistake;
     SetupFinding {
-        code,
+        code: code.into(),
         subject,
         message,
         certainty,

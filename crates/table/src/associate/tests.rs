@@ -104,7 +104,7 @@ fn the_middle_of_a_line_alone_is_ambiguous_and_says_so() {
         };
         assert!(cavities.len() >= 2 && cavities.contains(t), "{cavities:?} without {t}");
     }
-    let codes: Vec<_> = found.warnings.iter().map(|w| w.code).collect();
+    let codes: Vec<_> = found.warnings.iter().map(|w| &*w.code).collect();
     assert_eq!(codes, ["association-ambiguous", "too-few-seated"]);
 }
 

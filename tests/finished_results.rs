@@ -1,0 +1,94 @@
+//! Results of a finished run in the place of its pipeline.
+
+use crate::support::{armcal, run_pipeline};
+use armcal_config::Pipeline;
+use armcal_pipeline::{settle, settle_again};
+use armcal_report::Conclusions;
+use armcal_stages::Silent;
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// A rig with something hidden, and the results of its run.
+struct Finished {
+    folder: tempfile::TempDir,
+    pipeline: PathBuf,
+    out: PathBuf,
+}
+
+fn finished(hidden: &str) -> Finished {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let rig = folder.path().join("rig");
+    let simulated = armcal(["simulate", "--hide", hidden, "--seed", "61", "--out", &rig.to_string_lossy()]);
+    assert!(simulated.status.success(), "{}", String::from_utf8_lossy(&simulated.stderr));
+    let (pipeline, out) = (rig.join("pipeline.toml"), folder.path().join("out"));
+    run_pipeline(&pipeline, &out, &[0, 3]);
+    Finished { folder, pipeline, out }
+}
+
+/// What a command prints, whatever its exit code says of the arm.
+fn printed(words: &[&str], more: &[&Path]) -> String {
+    let output = armcal(words.iter().map(Path::new).chain(more.iter().copied()));
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn what_a_run_concluded_is_taken_from_its_results_and_shows_the_same() {
+    for hidden in ["backlash", "compliance", "outside:cable_drag", "nothing"] {
+        let Finished { folder, pipeline, out } = finished(hidden);
+        let loaded = Pipeline::load(&pipeline).expect("a pipeline");
+        let concluded = Conclusions::open(&out).expect("results");
+        let again = settle_again(&loaded, concluded, &Silent).expect("the same recordings");
+        assert!(again.concluded.is_some(), "{hidden}");
+        // Of the live page everything that `summary.json` says is the same.
+        let mut view = Command::new(env!("CARGO_BIN_EXE_armcal"))
+            .args([Path::new("view"), &out])
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("armcal view");
+        let lines = BufReader::new(view.stdout.take().expect("its output")).lines().map_while(Result::ok);
+        let until: Vec<String> = lines.take_while(|line| !line.starts_with("Open http://")).collect();
+        view.kill().and_then(|()| view.wait()).expect("ended");
+        assert!(until.iter().all(|line| !line.contains("other results")), "{hidden}: {until:?}");
+        for by in [&out, &out.join("run.mcap")] {
+            assert_eq!(printed(&["plan"], &[by]), printed(&["plan"], &[&pipeline]), "{hidden}");
+        }
+        if hidden == "backlash" {
+            let [of_out, of_pipeline] = [(&out, "a"), (&pipeline, "b")].map(|(given, name)| {
+                let (write, to) = (folder.path().join(format!("{name}.toml")), folder.path().join(name));
+                let more = [given, Path::new("--write"), &write, Path::new("--out"), &to];
+                printed(&["add", "suggested"], &more);
+                ["summary.json", "report.html"].map(|file| std::fs::read(to.join(file)).expect("a result"))
+            });
+            assert!(of_out == of_pipeline);
+        }
+    }
+}
+
+#[test]
+fn conclusions_of_anything_else_are_drawn_again() {
+    let Finished { folder, pipeline, out } = finished("backlash");
+    let concluded = || Conclusions::open(&out).expect("results").expect("conclusions");
+    let text = std::fs::read_to_string(&pipeline).expect("a pipeline");
+    let taken = |text: &str| {
+        std::fs::write(&pipeline, text).expect("a pipeline");
+        let loaded = Pipeline::load(&pipeline).expect("a pipeline");
+        settle_again(&loaded, Some(concluded()), &Silent).expect("recordings").concluded.is_some()
+    };
+    assert!(taken(&text));
+    assert!(!taken(&format!("{text}\n[diagnosis]\nmax_p_adjusted = 0.001\n")));
+    assert!(taken(&text));
+    // Another table of seats: other observations.
+    let board = pipeline.with_file_name("board.toml");
+    let seats = std::fs::read_to_string(&board).expect("a board");
+    std::fs::write(&board, seats.replacen("cavity_sigma_mm = ", "cavity_sigma_mm = 1", 1)).expect("a board");
+    assert!(!taken(&text));
+    std::fs::write(&board, &seats).expect("a board");
+    // Of another rig.
+    let other = finished("compliance");
+    let loaded = Pipeline::load(&other.pipeline).expect("a pipeline");
+    assert!(settle_again(&loaded, Some(concluded()), &Silent).expect("recordings").concluded.is_none());
+    assert!(settle(&loaded, &Silent).expect("recordings").concluded.is_none());
+    drop(folder);
+}
