@@ -1,7 +1,9 @@
 //! `armcal/conclusions.toml` in `run.mcap`: what took a run longer than its fit, so that whoever opens its results does not
 //! search again. TOML, because a number may be infinite.
 
+use crate::diagnosis_text::{Called, full_text};
 use crate::past_run::{attachment, run_file};
+use crate::pen::TerminalStyle;
 use crate::run::{Run, VERSION};
 use crate::{PastRunError, ReportError};
 use armcal_calibrate::Calibration;
@@ -23,8 +25,8 @@ pub struct Conclusions {
     schema: String,
     /// Hash of the [`Grounds`].
     grounds: String,
-    /// Whether what was found could be fitted.
-    refitted: bool,
+    /// How the run calls things.
+    called: Called,
     /// What contradicts the data about the setup.
     pub setup: SetupReport,
     /// What is missing in the model.
@@ -72,7 +74,7 @@ impl Conclusions {
         Some(Conclusions {
             schema: SCHEMA.to_owned(),
             grounds: grounds.hash(),
-            refitted: diagnosis.refitted.is_some(),
+            called: Called::of(run),
             setup: run.setup.clone(),
             diagnosis,
         })
@@ -93,11 +95,16 @@ impl Conclusions {
         toml::to_string(self).map_err(|e| ReportError::Inconsistent(format!("{FILE}: {e}")))
     }
 
+    /// The diagnosis in full, as that of the run.
+    pub fn diagnosis_text(&self, style: TerminalStyle) -> String {
+        full_text(&self.called, &self.diagnosis, style)
+    }
+
     /// The diagnosis, what it found fitted again.
     pub fn diagnosis_of(&self, calibrated: &Calibrated<'_>) -> Diagnosis {
         let mut diagnosis = self.diagnosis.clone();
         diagnosis.refitted = None;
-        if self.refitted {
+        if self.called.is_refitted {
             diagnosis.refit(calibrated);
         }
         diagnosis

@@ -14,6 +14,7 @@ use armcal_core::{Certainty, SetupReport, listed};
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport, Verdict};
 use armcal_model::{EffectKind, EffectSpec, Family, effects_toml, find};
 use comfy_table::Cell;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeSet;
 
@@ -30,13 +31,52 @@ const OVERDECLARED: f64 = 1.5;
 /// Heading of the tables that add what is unlisted.
 const PASTE: &str = "To paste into the pipeline";
 
+/// What a diagnosis is told with: how its run calls things.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Called {
+    /// Names of the recordings.
+    recordings: Vec<String>,
+    /// Names of the joints, where a headline numbers them through all branches.
+    branched_joints: Vec<String>,
+    /// Effects of the model that stand for one of several.
+    ties: Vec<(String, Vec<String>)>,
+    is_pool: bool,
+    /// Whether what was found could be fitted.
+    pub is_refitted: bool,
+}
+
+impl Called {
+    pub fn of(run: &Run) -> Called {
+        let chain = run.model.chain();
+        Called {
+            recordings: run.recordings.iter().map(|r| r.name.clone()).collect(),
+            branched_joints: if chain.is_branched() { chain.joint_names().to_vec() } else { Vec::new() },
+            ties: run.ties.clone(),
+            is_pool: run.is_pool(),
+            is_refitted: run.diagnosis.as_ref().is_some_and(|d| d.refitted.is_some()),
+        }
+    }
+
+    fn names(&self) -> RecordingNames {
+        RecordingNames::new(self.recordings.iter().cloned())
+    }
+
+    fn in_words(&self, sentence: &str) -> String {
+        self.names().in_words(sentence)
+    }
+}
+
 /// The diagnosis of a run in full, ending in a newline; says so where there is none.
 pub fn diagnosis_text(run: &Run, style: TerminalStyle) -> String {
-    let pen = Pen { style };
     match &run.diagnosis {
         None => run.answer().sentence + "\n",
-        Some(d) => full(&pen, run, d),
+        Some(d) => full_text(&Called::of(run), d, style),
     }
+}
+
+/// A diagnosis in full.
+pub(crate) fn full_text(called: &Called, d: &Diagnosis, style: TerminalStyle) -> String {
+    full(&Pen { style }, called, d)
 }
 
 /// The diagnosis of an earlier run, from its summary: the answer, the ranking, and every number in a sentence.
@@ -89,21 +129,21 @@ pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
 }
 
 /// What is missing: the answer, what was found, what to do next.
-fn brief(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
+fn brief(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
     let list = |label, entries: Vec<String>| pen.list(entries.into_iter().map(|entry| (label, entry)));
-    pen.section(&headline(run, d), list("-", all_found(run, d)) + &list("next:", next(run, d)))
+    pen.section(&headline(called, d), list("-", all_found(called, d)) + &list("next:", next(called, d)))
 }
 
 /// What was found: with names, without one, and what the choice among them is worth; one entry each.
-pub(crate) fn all_found(run: &Run, d: &Diagnosis) -> Vec<String> {
+pub(crate) fn all_found(called: &Called, d: &Diagnosis) -> Vec<String> {
     let nested = d.nested.iter().map(|n| printable(&nested_sentence(n)));
     let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e)));
     let all = d.effects.iter().map(found).chain(shown_unlisted(d).map(unlisted)).chain(beside).chain(nested);
-    all.map(|said| run.in_words(&said)).collect()
+    all.map(|said| called.in_words(&said)).collect()
 }
 
 /// The same in a line or two each: names, sizes, and what they take of the error.
-pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
+pub(crate) fn briefly_found(called: &Called, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised from {:.3} to {:.3} mm", h.before, h.after);
     let sizes = |e: &FoundEffect| match e.parameters.len() {
         ..=FEW_SIZES => sizes_of(e),
@@ -125,16 +165,16 @@ pub(crate) fn briefly_found(run: &Run, d: &Diagnosis) -> Vec<String> {
         .beside_curves()
         .iter()
         .map(|e| format!("{WITH_CURVES}{}: {}", e.set.join(" or "), falls(&e.places)));
-    named.chain(unlisted).chain(beside).map(|said| run.in_words(&printable(&said))).collect()
+    named.chain(unlisted).chain(beside).map(|said| called.in_words(&printable(&said))).collect()
 }
 
 /// What is said before an effect that shows only beside error curves of joints.
 pub(crate) const WITH_CURVES: &str = "with these curves in the model also ";
 
 /// What to do next, one step an entry.
-pub(crate) fn next(run: &Run, d: &Diagnosis) -> Vec<String> {
-    let recorded = d.record_next.iter().map(|r| run.in_words(&printable(r)));
-    added(run, d).into_iter().chain(looked_at(run, d)).chain(recorded).collect()
+pub(crate) fn next(called: &Called, d: &Diagnosis) -> Vec<String> {
+    let recorded = d.record_next.iter().map(|r| called.in_words(&printable(r)));
+    added(called, d).into_iter().chain(looked_at(called, d)).chain(recorded).collect()
 }
 
 /// The kind of an effect that was found; none of something without a name.
@@ -150,7 +190,7 @@ fn one_kind(d: &Diagnosis) -> Option<&'static EffectKind> {
 }
 
 /// What to look at on the rig, once for all effects of one kind; only where one name is left.
-fn looked_at(run: &Run, d: &Diagnosis) -> Vec<String> {
+fn looked_at(called: &Called, d: &Diagnosis) -> Vec<String> {
     let mut steps: Vec<(&str, Vec<&str>)> = Vec::new();
     for e in d.effects.iter().filter(|e| e.set.len() == 1) {
         let Some(kind) = kind_of(e).filter(|kind| kind.family != Family::User) else { continue };
@@ -164,12 +204,14 @@ fn looked_at(run: &Run, d: &Diagnosis) -> Vec<String> {
         let advice = format!("{}{}", capital.to_ascii_lowercase(), rest.trim_end_matches('.'));
         printable(&format!("{}: {advice}", names.join(", ")))
     };
-    steps.into_iter().map(|s| run.in_words(&step(s))).collect()
+    steps.into_iter().map(|s| called.in_words(&step(s))).collect()
 }
 
 /// What adding it to the model does, where something was found and a calibration with it confirms it.
-fn added(run: &Run, d: &Diagnosis) -> Option<String> {
-    d.refitted.as_ref()?;
+fn added(called: &Called, d: &Diagnosis) -> Option<String> {
+    if !called.is_refitted {
+        return None;
+    }
     let (before, after) = (d.holdout_mm.before, d.holdout_mm.after);
     let error = d.judged.words();
     let does = match d.warnings.iter().any(|w| w.code == "judged-by-fit") {
@@ -179,7 +221,7 @@ fn added(run: &Run, d: &Diagnosis) -> Option<String> {
         false => format!("the mean {error} error goes from {before:.3} to {after:.3} mm"),
     };
     // `armcal add` reads the recordings of a pipeline; a pool has none.
-    let adds = match run.is_pool() {
+    let adds = match called.is_pool {
         true => "with it under `[[effects]]` of the pipeline, pooled again",
         false => "`armcal add suggested PIPELINE` adds it to the model",
     };
@@ -187,11 +229,11 @@ fn added(run: &Run, d: &Diagnosis) -> Option<String> {
 }
 
 /// The answer in one sentence.
-pub(crate) fn headline(run: &Run, d: &Diagnosis) -> String {
-    let ties = run.ties.iter().map(|(name, all)| tied(name, all));
+pub(crate) fn headline(called: &Called, d: &Diagnosis) -> String {
+    let ties = called.ties.iter().map(|(name, all)| tied(name, all));
     let also = overdeclared(d).into_iter().chain(ties);
-    let told = [as_spelt(run, d)].into_iter().chain(also).collect::<Vec<_>>().join(" ");
-    run.in_words(&told) + &joints_told(run, d)
+    let told = [as_spelt(called, d)].into_iter().chain(also).collect::<Vec<_>>().join(" ");
+    called.in_words(&told) + &joints_told(called, d)
 }
 
 /// That a name in the model stands for one of several.
@@ -212,9 +254,9 @@ fn overdeclared(d: &Diagnosis) -> Option<String> {
 }
 
 /// The names of the joints that a headline numbers through all branches; nothing for an arm without any.
-fn joints_told(run: &Run, d: &Diagnosis) -> String {
-    let names = run.model.chain().joint_names();
-    if !run.model.chain().is_branched() {
+fn joints_told(called: &Called, d: &Diagnosis) -> String {
+    let names = &called.branched_joints;
+    if names.is_empty() {
         return String::new();
     }
     let of_effects =
@@ -227,7 +269,7 @@ fn joints_told(run: &Run, d: &Diagnosis) -> String {
 }
 
 /// The same with recordings by their index, and events as a pipeline spells them.
-fn as_spelt(run: &Run, d: &Diagnosis) -> String {
+fn as_spelt(called: &Called, d: &Diagnosis) -> String {
     let unseen = d.not_testable.len();
     match d.verdict {
         Verdict::NothingMissing => {
@@ -235,7 +277,7 @@ fn as_spelt(run: &Run, d: &Diagnosis) -> String {
                 0 => String::new(),
                 n => format!(" ({n} effects of realistic size would not have shown)"),
             };
-            let nothing = if run.ties.is_empty() { "Nothing" } else { "Nothing else" };
+            let nothing = if called.ties.is_empty() { "Nothing" } else { "Nothing else" };
             format!("{nothing} is missing that these data can show{not_shown}.")
         }
         Verdict::Identified => {
@@ -351,11 +393,11 @@ fn beside(d: &Diagnosis) -> String {
     })
 }
 
-fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
-    let told = |said: &str| run.in_words(&printable(said));
-    let names = run.recording_names();
-    let mut sections = vec![brief(pen, run, d)];
-    sections.push(pen.section("Candidates, best first", ranking(pen, run, d)));
+fn full(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
+    let told = |said: &str| called.in_words(&printable(said));
+    let names = called.names();
+    let mut sections = vec![brief(pen, called, d)];
+    sections.push(pen.section("Candidates, best first", ranking(pen, called, d)));
     if !d.cannot_tell_apart.is_empty() {
         let pairs = d.cannot_tell_apart.iter().map(|[a, b]| ("-", told(&format!("{a} and {b}"))));
         sections.push(pen.section("The same to these data", pen.list(pairs)));
@@ -381,7 +423,7 @@ fn full(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     sections.join("\n")
 }
 
-fn ranking(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
+fn ranking(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
     let mut table = pen.table(&[
         "explanation",
         "size",
@@ -394,14 +436,14 @@ fn ranking(pen: &Pen, run: &Run, d: &Diagnosis) -> String {
     ]);
     for c in d.candidates.iter().take(RANKED) {
         table.add_row(vec![
-            Cell::new(run.in_words(&printable(&c.spec))),
+            Cell::new(called.in_words(&printable(&c.spec))),
             Cell::new(sizes(c)),
             number(behind(c.standing.map(|s| s.behind_nats), c.standing.map(|s| s.behind_se))),
             number(c.standing.map_or("-".into(), |s| format!("{:.3}", s.probability))),
             number(format!("{:.3}", c.p_adjusted)),
             number(c.holdout_mm.map_or("-".into(), |h| format!("{:.3} -> {:.3}", h.before, h.after))),
             number(format!("{:.0} %", c.absorbed * 100.0)),
-            Cell::new(run.in_words(&printable(&c.same_to_the_data.join(", ")))),
+            Cell::new(called.in_words(&printable(&c.same_to_the_data.join(", ")))),
         ]);
     }
     pen.render(&table)

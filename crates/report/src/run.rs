@@ -4,7 +4,7 @@ pub use armcal_campaign::Status;
 
 use crate::ReportError;
 use crate::adequate::as_wanted;
-use crate::diagnosis_text::{headline, setup_beside, setup_sentence};
+use crate::diagnosis_text::{Called, headline, setup_beside, setup_sentence};
 use crate::past_observations::ObservedFile;
 use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
@@ -193,8 +193,11 @@ impl Run {
         }
         if let Some(diagnosis) = &self.diagnosis {
             let beside = setup_beside(&self.setup).map(|beside| self.in_words(&beside));
-            let sentence =
-                [headline(self, diagnosis)].into_iter().chain(beside).collect::<Vec<_>>().join(" ");
+            let sentence = [headline(&Called::of(self), diagnosis)]
+                .into_iter()
+                .chain(beside)
+                .collect::<Vec<_>>()
+                .join(" ");
             return Answer { word: diagnosis.verdict.word(), sentence };
         }
         let sentence = match self.undiagnosed {

@@ -1,7 +1,7 @@
 //! How a run ends, in sentences: what the calibration reached, what is missing, whether the result stands, what to do next.
 //! Terminal and viewer say the same because both say this.
 
-use crate::diagnosis_text::{all_found, briefly_found, next};
+use crate::diagnosis_text::{Called, all_found, briefly_found, next};
 use crate::pool_story;
 use crate::run::{Run, Status};
 use crate::text::conclusion;
@@ -39,16 +39,18 @@ impl Story {
     pub fn of(run: &Run) -> Story {
         let answer = run.answer();
         let status = run.status();
-        let diagnosis = run.diagnosis.as_ref();
+        let (diagnosis, called) = (run.diagnosis.as_ref(), Called::of(run));
         Story {
             lamp: lamp(answer.word, status),
             calibration: conclusion(&run.calibration) + &pool_story::transfer(run),
-            found: diagnosis.map_or_else(Vec::new, |d| all_found(run, d)),
-            found_briefly: diagnosis.map_or_else(Vec::new, |d| briefly_found(run, d)),
+            found: diagnosis.map_or_else(Vec::new, |d| all_found(&called, d)),
+            found_briefly: diagnosis.map_or_else(Vec::new, |d| briefly_found(&called, d)),
             status,
             incomplete: matches!(answer.word, "identified" | "ambiguous" | "unknown"),
             next: match diagnosis {
-                Some(d) => next(run, d).into_iter().chain(pool_story::days(run)).chain(scale(run)).collect(),
+                Some(d) => {
+                    next(&called, d).into_iter().chain(pool_story::days(run)).chain(scale(run)).collect()
+                }
                 None if answer.word == "setup" => vec![MEND.to_owned()],
                 None => pool_story::effect(run)
                     .into_iter()

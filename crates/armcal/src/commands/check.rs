@@ -5,7 +5,7 @@ use super::{Outcome, may_write, print};
 use crate::check::{Judged, Judgement, Limits, SCHEMA, judge, junit, markdown, text};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::view;
+use crate::view::{self, Given};
 use armcal_config::Pipeline;
 use armcal_recording::atomic;
 use armcal_report::{printable, write_all};
@@ -16,7 +16,8 @@ use std::path::PathBuf;
 /// What `armcal check` is asked to do.
 #[derive(Debug, Clone, Args)]
 pub struct Request {
-    /// Pipeline file with a [check] section.
+    /// Pipeline file with a [check] section, or the results of its run (their folder or run.mcap): what these concluded is not
+    /// looked for again.
     pub pipeline: PathBuf,
     /// Write JUnit XML: a suite with a case for each limit, or an error where the run failed.
     #[arg(long, value_name = "FILE")]
@@ -36,9 +37,10 @@ pub struct Request {
 /// shows the checks.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
     // Loaded first: the files it names are inputs.
-    let pipeline = Pipeline::load(&request.pipeline);
+    let given = Given::alone(&request.pipeline);
+    let loaded = given.and_then(|given| Ok((Pipeline::load(&given.pipeline)?, given)));
     may_write([&request.junit, &request.markdown].into_iter().flatten())?;
-    match pipeline.map_err(Error::from).and_then(|pipeline| judged(request, &pipeline)) {
+    match loaded.and_then(|(pipeline, given)| judged(request, &pipeline, given)) {
         Ok(judged) => {
             write(&request.junit, || junit::junit(&judged))?;
             write(&request.markdown, || Ok(markdown::markdown(&judged)))?;
@@ -56,17 +58,18 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     }
 }
 
-fn judged(request: &Request, pipeline: &Pipeline) -> Result<Judged, Error> {
-    let limits = Limits::of(pipeline, &request.pipeline)?;
+fn judged(request: &Request, pipeline: &Pipeline, given: Given) -> Result<Judged, Error> {
+    let limits = Limits::of(pipeline, &given.pipeline)?;
     may_write(request.out.as_deref().map(|out| results(pipeline, out)).into_iter().flatten())?;
     let progress = Progress::new();
-    let (mut run, recordings) = armcal_pipeline::settle(pipeline, &progress)?.diagnosed(pipeline, &progress);
+    let settled = armcal_pipeline::settle_again(pipeline, given.concluded, &progress)?;
+    let (mut run, recordings) = settled.diagnosed(pipeline, &progress);
+    armcal_pipeline::add_refits(&mut run, pipeline, &progress)?;
     let judged = judge(&run, &limits)?;
     if let Some(out) = &request.out {
-        armcal_pipeline::add_refits(&mut run, pipeline, &progress)?;
         progress.step("writing results");
         write_all(&run, &recordings, out, &pipeline.output)?;
-        view::remember(out, &request.pipeline, &[])?;
+        view::remember(out, &given.pipeline, &[])?;
     }
     progress.finish();
     Ok(judged)

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{PastRun, Status, diagnosis_text, past_diagnosis, summary_json};
+use armcal_report::{Conclusions, PastRun, Status, diagnosis_text, past_diagnosis, summary_json};
 use std::path::Path;
 
 /// Diagnoses a pipeline, or prints the diagnosis of a finished run (`run.mcap` or its folder).
@@ -15,7 +15,8 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
         if json {
             print(&super::json_text(&past.summary["diagnosis"])?)?;
         } else {
-            print(&past_diagnosis(&past, style()))?;
+            let concluded = Conclusions::open(input)?;
+            print(&concluded.map_or_else(|| past_diagnosis(&past, style()), |c| c.diagnosis_text(style())))?;
         }
         let lost = past.summary["status"] == Status::DataLost.word();
         if lost {
@@ -28,7 +29,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     }
     let pipeline = Pipeline::load(input)?;
     let progress = Progress::new();
-    let (run, _) = armcal_pipeline::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
+    let (run, _) = armcal_pipeline::run(&pipeline, &progress)?;
     progress.finish();
     if json {
         let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)?).map_err(Error::Json)?;
