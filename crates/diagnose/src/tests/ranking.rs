@@ -153,3 +153,15 @@ fn shares_of_several_effects_multiply() {
         near(ranking.p_nothing, 0.05 * 0.1);
     });
 }
+
+#[test]
+fn without_a_name_what_is_not_listed_has_its_share() {
+    let mut r = arm::rng(40);
+    let poses = arm::design(0, &mut r);
+    let (_, _, _, effect) = arm::outside(1.0).remove(0);
+    let p = arm::problem(&poses, &[(effect, vec![])], arm::Noise::White, &mut r, false);
+    let ranking = Ranking::of_nothing(&crate::tests::room(&p, &quick()), &quick());
+    let listed: f64 = ranking.explanations.iter().map(|e| e.standing.probability).sum();
+    assert!(ranking.p_unlisted > 0.9, "{}", ranking.p_unlisted);
+    assert!((ranking.p_nothing + ranking.p_unlisted + listed - 1.0).abs() < 1e-9);
+}
