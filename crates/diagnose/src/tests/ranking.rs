@@ -133,6 +133,9 @@ fn shares_of_several_effects_multiply() {
         let shares = [("backlash:3", 0.75, 0.2, 0.05), ("zero_drift:3", 0.5, 0.4, 0.1)];
         for (a, (other, own, share, nothing)) in found.accepted.iter_mut().zip(shares) {
             let score = a.judged.score.clone();
+            a.judged.significance[a.judged.entry].p_adjusted = nothing;
+            let named = entry(&a.room.weighed, other);
+            a.judged.significance[named].p_adjusted = 0.01;
             let what = [
                 (Instead::Entry(a.judged.entry), own),
                 (Instead::Entry(entry(&a.room.weighed, other)), share),
@@ -151,6 +154,13 @@ fn shares_of_several_effects_multiply() {
         near(of("backlash:3", &names[1]), 0.2 * 0.5);
         near(of(&names[0], "zero_drift:3"), 0.75 * 0.4);
         near(ranking.p_nothing, 0.05 * 0.1);
+        near(ranking.p_unlisted, 0.0);
+        // Of several the largest family-wise p-value: that of the name which stays, and of what takes the other one's place.
+        let [a, b] = &found.accepted[..] else { panic!("two") };
+        let swapped = ranking.explanations.iter().find(|e| e.effects == ["backlash:3", &names[1]]).unwrap();
+        let p = |a: &Accepted, k: usize| a.judged.significance[k].p_adjusted;
+        let of_other = p(a, entry(&a.room.weighed, "backlash:3"));
+        assert_eq!(swapped.p_adjusted, of_other.max(p(b, b.judged.entry)));
     });
 }
 
