@@ -169,6 +169,9 @@ fn within_a_standard_error_the_simplest_comes_first_and_beyond_it_what_says_more
         let set = simplest_first(members.iter().collect(), room.costs(&config));
         assert_eq!(set.first(), Some(&first), "{scattered:?}");
     }
+    // Eight nats more less three for the amplitude, and a standard error of six.
+    let members = [(twin, of([4.6, -0.6, 4.6, -0.6])), (simple, of([0.0; 4]))];
+    assert_eq!(simplest_first(members.iter().collect(), room.costs(&config)), [simple, twin]);
     // What is worth most and simplest is so too where it says less.
     let members = [(simple, of([0.0; 4])), (twin, of([0.25; 4]))];
     assert_eq!(simplest_first(members.iter().collect(), room.costs(&config)), [simple, twin]);
