@@ -319,8 +319,8 @@ fn of_one_answer_what_is_known_to_act_is_told_and_the_others_are_named() {
     assert_eq!(answered(&p, &said, &[]).1, owned(&[]));
 }
 
-/// The specs of [`near`] a play whose score is 20 nats above nothing, where one step gives others so many nats more than the play.
-fn near_a_play(p: &Problem, more: &[(&str, f64)]) -> Vec<String> {
+/// The specs of [`near`] a play whose score is so many nats above nothing, where one step gives others so many nats more than the play.
+fn near_a_play(p: &Problem, gain: f64, more: &[(&str, f64)]) -> Vec<String> {
     let config = quick();
     let score = |nats: f64| {
         crate::score::tests::score(&[nats / 4.0 + 0.01, nats / 4.0, nats / 4.0 - 0.01, nats / 4.0])
@@ -331,10 +331,10 @@ fn near_a_play(p: &Problem, more: &[(&str, f64)]) -> Vec<String> {
         let own = crate::tests::entry(&room.weighed, "backlash:1");
         (0..room.weighed.entries.len()).for_each(|k| room.suppose(k, score(-100.0)));
         for (spec, nats) in more {
-            room.suppose(crate::tests::entry(&room.weighed, spec), score(20.0 + nats));
+            room.suppose(crate::tests::entry(&room.weighed, spec), score(gain + nats));
         }
         found.judged = room.judge(own, &config);
-        found.judged.score = score(20.0);
+        found.judged.score = score(gain);
         found.judged.gain = found.judged.score.above(&score(0.0));
         near(&found, &room, &config)
             .into_iter()
@@ -347,10 +347,13 @@ fn near_a_play(p: &Problem, more: &[(&str, f64)]) -> Vec<String> {
 fn a_name_and_what_one_step_puts_near_the_best_are_refitted() {
     let p = mixed(1.5);
     // Ten nats and a hundredth of what there is to gain are the detail that one step may miss.
-    assert_eq!(near_a_play(&p, &[("twin", -9.0)]), ["backlash:1", "twin"]);
-    assert_eq!(near_a_play(&p, &[("twin", -11.0)]), ["backlash:1"]);
-    assert_eq!(near_a_play(&p, &[("twin", 9.0)]), ["backlash:1", "twin"], "the name comes first");
-    assert_eq!(near_a_play(&p, &[("twin", 60.0)]), ["backlash:1", "twin"], "however far it is behind");
+    assert_eq!(near_a_play(&p, 20.0, &[("twin", -9.0)]), ["backlash:1", "twin"]);
+    assert_eq!(near_a_play(&p, 20.0, &[("twin", -11.0)]), ["backlash:1"]);
+    // Or a quarter of it.
+    assert_eq!(near_a_play(&p, 100.0, &[("twin", -20.0)]), ["backlash:1", "twin"]);
+    assert_eq!(near_a_play(&p, 100.0, &[("twin", -30.0)]), ["backlash:1"]);
+    assert_eq!(near_a_play(&p, 20.0, &[("twin", 9.0)]), ["backlash:1", "twin"], "the name comes first");
+    assert_eq!(near_a_play(&p, 20.0, &[("twin", 60.0)]), ["backlash:1", "twin"], "however far it is behind");
 }
 
 #[test]
