@@ -29,10 +29,12 @@ fn finished(hidden: &str) -> Finished {
     Finished { folder, pipeline, out }
 }
 
-/// What a command prints, whatever its exit code says of the arm.
+/// What a command prints, whatever its exit code says of the arm: a limit that does not hold is 1 of `check` alone.
 fn printed(words: &[&str], more: &[&Path]) -> String {
     let output = armcal(words.iter().map(Path::new).chain(more.iter().copied()));
-    assert!(matches!(output.status.code(), Some(0 | 1 | 3)), "{}", String::from_utf8_lossy(&output.stderr));
+    let code = output.status.code();
+    let ended = matches!(code, Some(0 | 3)) || words == ["check"] && code == Some(1);
+    assert!(ended && !output.stdout.is_empty(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 

@@ -49,13 +49,16 @@ pub(crate) fn set_diagnosis(run: &mut Run, found: Result<Option<Diagnosis>, RunE
     };
 }
 
-/// The choice of what was found, made again without each part of the hold-out.
+/// The choice of what was found, made again without each part of the hold-out; as it was made, where it was.
 pub fn chosen_again(
     pipeline: &Pipeline,
     calibrated: &Calibrated<'_>,
     found: &Diagnosis,
     progress: &dyn Steps,
 ) -> Result<Option<Nested>, RunError> {
+    if found.nested.is_some() {
+        return Ok(found.nested.clone());
+    }
     progress.step("choosing again without each part of the hold-out");
     Ok(nested(calibrated, found, &pipeline.diagnosis)?)
 }

@@ -26,7 +26,7 @@ pub fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) -> R
     let Some(mut diagnosis) = run.diagnosis.take() else { return Ok(()) };
     let calibrated = calibrated(run, pipeline);
     let Refits { steps, alternatives, warnings } = sized_by_refits(&mut diagnosis, &calibrated, progress)?;
-    if !steps.is_empty() && diagnosis.nested.is_none() && diagnosis.not_chosen_again.is_none() {
+    if !steps.is_empty() {
         choose_again(&mut diagnosis, pipeline, (&calibrated, run.is_pool()), progress);
     }
     (run.steps, run.alternatives, run.diagnosis) = (steps, alternatives, Some(diagnosis));

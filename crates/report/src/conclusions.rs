@@ -1,7 +1,8 @@
 //! `armcal/conclusions.toml` in `run.mcap`: what took a run longer than its fit, so that whoever opens its results does not
 //! search again. TOML, because a number may be infinite.
 
-use crate::diagnosis_text::{Called, full_text};
+use crate::called::Called;
+use crate::diagnosis_text::full_text;
 use crate::past_run::{attachment, run_file};
 use crate::pen::TerminalStyle;
 use crate::run::{Run, VERSION};
@@ -74,7 +75,7 @@ impl Conclusions {
         Some(Conclusions {
             schema: SCHEMA.to_owned(),
             grounds: grounds.hash(),
-            called: Called::of(run),
+            called: run.called(),
             setup: run.setup.clone(),
             diagnosis,
         })

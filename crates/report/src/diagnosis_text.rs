@@ -1,11 +1,10 @@
 //! What is missing, for a person in the terminal.
 
+use crate::called::Called;
 use crate::explanations::{explanations, nested_sentence};
 use crate::findings::shown_unlisted;
 use crate::look_at::look_at;
-use crate::past_run::PastRun;
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::recording_names::RecordingNames;
 use crate::run::Run;
 use crate::sizes::{clear, size_in_table, sizes, sizes_of};
 use crate::text::printable;
@@ -14,14 +13,12 @@ use armcal_core::{Certainty, SetupReport, listed};
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport, Verdict};
 use armcal_model::{EffectKind, EffectSpec, Family, effects_toml, find};
 use comfy_table::Cell;
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::BTreeSet;
 
 /// Rows of the ranking.
-const RANKED: usize = 8;
+pub(crate) const RANKED: usize = 8;
 /// Heading of errors that no calibration gave.
-const PREDICTED: &str = "linearised, left out [mm]";
+pub(crate) const PREDICTED: &str = "linearised, left out [mm]";
 /// Amplitudes of an effect that are told where there is a line or two.
 const FEW_SIZES: usize = 2;
 /// Share of a curve [%] from which the multiples of a ripple are worth a word.
@@ -29,103 +26,19 @@ const BENT_PERCENT: f64 = 5.0;
 /// Where the declared noise gives this many times the error that remains it is declared too large.
 const OVERDECLARED: f64 = 1.5;
 /// Heading of the tables that add what is unlisted.
-const PASTE: &str = "To paste into the pipeline";
-
-/// What a diagnosis is told with: how its run calls things.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Called {
-    /// Names of the recordings.
-    recordings: Vec<String>,
-    /// Names of the joints, where a headline numbers them through all branches.
-    branched_joints: Vec<String>,
-    /// Effects of the model that stand for one of several.
-    ties: Vec<(String, Vec<String>)>,
-    is_pool: bool,
-    /// Whether what was found could be fitted.
-    pub is_refitted: bool,
-}
-
-impl Called {
-    pub fn of(run: &Run) -> Called {
-        let chain = run.model.chain();
-        Called {
-            recordings: run.recordings.iter().map(|r| r.name.clone()).collect(),
-            branched_joints: if chain.is_branched() { chain.joint_names().to_vec() } else { Vec::new() },
-            ties: run.ties.clone(),
-            is_pool: run.is_pool(),
-            is_refitted: run.diagnosis.as_ref().is_some_and(|d| d.refitted.is_some()),
-        }
-    }
-
-    fn names(&self) -> RecordingNames {
-        RecordingNames::new(self.recordings.iter().cloned())
-    }
-
-    fn in_words(&self, sentence: &str) -> String {
-        self.names().in_words(sentence)
-    }
-}
+pub(crate) const PASTE: &str = "To paste into the pipeline";
 
 /// The diagnosis of a run in full, ending in a newline; says so where there is none.
 pub fn diagnosis_text(run: &Run, style: TerminalStyle) -> String {
     match &run.diagnosis {
         None => run.answer().sentence + "\n",
-        Some(d) => full_text(&Called::of(run), d, style),
+        Some(d) => full_text(&run.called(), d, style),
     }
 }
 
 /// A diagnosis in full.
 pub(crate) fn full_text(called: &Called, d: &Diagnosis, style: TerminalStyle) -> String {
     full(&Pen { style }, called, d)
-}
-
-/// The diagnosis of an earlier run, from its summary: the answer, the ranking, and every number in a sentence.
-pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
-    let pen = Pen { style };
-    let d = &past.summary["diagnosis"];
-    let names = RecordingNames::new(past.recordings.iter().map(|r| r.name.clone()));
-    let text = |v: &Value| v.as_str().map(printable).unwrap_or_default();
-    let list = |v: &Value| v.as_array().into_iter().flatten().map(text).collect::<Vec<_>>();
-    let told = |v: &Value| names.in_words(&text(v));
-    let answer = told(&past.summary["answer_sentence"]);
-    if d.is_null() {
-        let answer = if answer.is_empty() { "It was not diagnosed.".to_owned() } else { answer };
-        return format!("{}: {answer}\n", past.path.display());
-    }
-    let missing = list(&d["names"]).join(", ");
-    let headline = match answer.is_empty() {
-        true => format!("{} {missing}", text(&d["verdict"]).replace('_', " ")),
-        false => answer,
-    };
-    let mut table = pen.table(&["explanation", "behind [nats]", "probability", "p", PREDICTED]);
-    let three = |v: &Value| v.as_f64().map_or("-".to_owned(), |v| format!("{v:.3}"));
-    for c in d["candidates"].as_array().into_iter().flatten().take(RANKED) {
-        let h = &c["holdout_mm"];
-        table.add_row(vec![
-            Cell::new(told(&c["spec"])),
-            number(behind(c["behind_nats"].as_f64(), c["behind_se"].as_f64())),
-            number(three(&c["probability"])),
-            number(three(&c["p_adjusted"])),
-            number(format!("{} -> {}", three(&h["before"]), three(&h["after"]))),
-        ]);
-    }
-    let sentences = d["explanations"].as_array().into_iter().flatten();
-    let sentences = sentences
-        .map(|e| ("-", format!("{}: {}", names.number_label(&text(&e["number"])), told(&e["sentence"]))));
-    let next = list(&d["record_next"]).into_iter().map(|r| ("next:", names.in_words(&r)));
-    let mut sections = vec![
-        pen.section(headline.trim(), pen.list(next)),
-        pen.section("Candidates, best first", pen.render(&table)),
-    ];
-    let unlisted = d["unlisted"].as_array().into_iter().flatten();
-    let safe = |table: &str| table.lines().map(|l| printable(l) + "\n").collect::<String>();
-    let tables: Vec<String> =
-        unlisted.filter_map(|u| u["table"].as_str()).filter(|table| !table.is_empty()).map(safe).collect();
-    if !tables.is_empty() {
-        sections.push(pen.section(PASTE, tables.join("\n")));
-    }
-    sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
-    sections.join("\n")
 }
 
 /// What is missing: the answer, what was found, what to do next.
@@ -395,7 +308,6 @@ fn beside(d: &Diagnosis) -> String {
 
 fn full(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
     let told = |said: &str| called.in_words(&printable(said));
-    let names = called.names();
     let mut sections = vec![brief(pen, called, d)];
     sections.push(pen.section("Candidates, best first", ranking(pen, called, d)));
     if !d.cannot_tell_apart.is_empty() {
@@ -416,9 +328,9 @@ fn full(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
     if !tables.is_empty() {
         sections.push(pen.section(PASTE, tables.join("\n")));
     }
-    let sentences = explanations(d)
-        .into_iter()
-        .map(|e| ("-", format!("{}: {}", names.number_label(&printable(&e.number)), told(&e.sentence))));
+    let sentences = explanations(d).into_iter().map(|e| {
+        ("-", format!("{}: {}", called.recordings.number_label(&printable(&e.number)), told(&e.sentence)))
+    });
     sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
     sections.join("\n")
 }
@@ -450,7 +362,7 @@ fn ranking(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
 }
 
 /// How far behind the answer, with its standard error.
-fn behind(nats: Option<f64>, se: Option<f64>) -> String {
+pub(crate) fn behind(nats: Option<f64>, se: Option<f64>) -> String {
     nats.zip(se).map_or("-".into(), |(nats, se)| format!("{nats:.1} ± {se:.1}"))
 }
 

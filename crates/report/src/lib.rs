@@ -15,6 +15,7 @@
 
 mod adequate;
 mod by_marker;
+mod called;
 mod campaign;
 mod channels;
 mod comparison;
@@ -31,6 +32,7 @@ mod model_file;
 mod page;
 mod pairing;
 mod parameters;
+mod past_diagnosis;
 mod past_model;
 mod past_observations;
 mod past_run;
@@ -63,13 +65,14 @@ pub use campaign::{
 };
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use conclusions::{Conclusions, Grounds};
-pub use diagnosis_text::{channel_told, diagnosis_text, driver_told, past_diagnosis};
+pub use diagnosis_text::{channel_told, diagnosis_text, driver_told};
 pub use error::ReportError;
 pub use explanations::nested_sentence;
 pub use look_at::look_at;
 pub use model_file::marked_xml;
 pub use page::{Basis, PageKind, comparison_html, refit_json, report_html};
 pub use pairing::{Side, Unpaired};
+pub use past_diagnosis::past_diagnosis;
 pub use past_model::open_model;
 pub use past_observations::{
     BoardFacts, OBSERVATIONS_FILE, ObservedFile, ObservedRecording, PastObservations, StartFrame,

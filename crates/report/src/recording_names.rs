@@ -7,9 +7,10 @@
 use crate::text::printable;
 use armcal_core::Warning;
 use armcal_model::{Since, place_and_moment};
+use serde::{Deserialize, Serialize};
 
 /// Names of recordings by their index in the pipeline.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RecordingNames(Vec<String>);
 
 impl RecordingNames {

@@ -4,7 +4,8 @@ pub use armcal_campaign::Status;
 
 use crate::ReportError;
 use crate::adequate::as_wanted;
-use crate::diagnosis_text::{Called, headline, setup_beside, setup_sentence};
+use crate::called::Called;
+use crate::diagnosis_text::{headline, setup_beside, setup_sentence};
 use crate::past_observations::ObservedFile;
 use crate::recorded_time::RecordedTime;
 use crate::recording_names::RecordingNames;
@@ -193,11 +194,8 @@ impl Run {
         }
         if let Some(diagnosis) = &self.diagnosis {
             let beside = setup_beside(&self.setup).map(|beside| self.in_words(&beside));
-            let sentence = [headline(&Called::of(self), diagnosis)]
-                .into_iter()
-                .chain(beside)
-                .collect::<Vec<_>>()
-                .join(" ");
+            let sentence =
+                [headline(&self.called(), diagnosis)].into_iter().chain(beside).collect::<Vec<_>>().join(" ");
             return Answer { word: diagnosis.verdict.word(), sentence };
         }
         let sentence = match self.undiagnosed {
@@ -270,6 +268,18 @@ impl Run {
     /// Its recordings as sentences call them.
     pub fn recording_names(&self) -> RecordingNames {
         RecordingNames::new(self.recordings.iter().map(|r| r.name.clone()))
+    }
+
+    /// What its diagnosis is told with.
+    pub(crate) fn called(&self) -> Called {
+        let chain = self.model.chain();
+        Called {
+            recordings: self.recording_names(),
+            branched_joints: if chain.is_branched() { chain.joint_names().to_vec() } else { Vec::new() },
+            ties: self.ties.clone(),
+            is_pool: self.is_pool(),
+            is_refitted: self.diagnosis.as_ref().is_some_and(|d| d.refitted.is_some()),
+        }
     }
 
     /// Whether it is of earlier results, without reading a recording.

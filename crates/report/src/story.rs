@@ -1,7 +1,7 @@
 //! How a run ends, in sentences: what the calibration reached, what is missing, whether the result stands, what to do next.
 //! Terminal and viewer say the same because both say this.
 
-use crate::diagnosis_text::{Called, all_found, briefly_found, next};
+use crate::diagnosis_text::{all_found, briefly_found, next};
 use crate::pool_story;
 use crate::run::{Run, Status};
 use crate::text::conclusion;
@@ -39,7 +39,7 @@ impl Story {
     pub fn of(run: &Run) -> Story {
         let answer = run.answer();
         let status = run.status();
-        let (diagnosis, called) = (run.diagnosis.as_ref(), Called::of(run));
+        let (diagnosis, called) = (run.diagnosis.as_ref(), run.called());
         Story {
             lamp: lamp(answer.word, status),
             calibration: conclusion(&run.calibration) + &pool_story::transfer(run),

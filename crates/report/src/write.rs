@@ -94,12 +94,9 @@ pub fn write_all(
         models.iter().map(|ModelFile { name, media_type, text, .. }| Attachment { name, media_type, text });
     attachments.splice(4..4, of_models);
     let concluded = Conclusions::of(run).map(|conclusions| conclusions.text()).transpose()?;
-    let of_search = concluded.iter().map(|text| Attachment {
-        name: conclusions::FILE,
-        media_type: "application/toml",
-        text,
-    });
-    attachments.extend(of_search);
+    let concluded = concluded.as_deref();
+    let named = |text| Attachment { name: conclusions::FILE, media_type: "application/toml", text };
+    attachments.extend(concluded.map(named));
     let to_copy = config.copied(recordings);
     let mcap_path = out_dir.join(RUN);
     let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);

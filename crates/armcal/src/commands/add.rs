@@ -154,7 +154,6 @@ fn chosen(
     let diagnosis = settled.diagnose(pipeline, progress)?;
     let joints = geometry.chain().joint_names();
     let nested = match &diagnosis {
-        Some(found) if found.nested.is_some() => found.nested.clone(),
         Some(found) => {
             armcal_pipeline::chosen_again(pipeline, &settled.fitted.calibrated(pipeline), found, progress)?
         }

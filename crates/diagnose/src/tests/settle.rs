@@ -108,6 +108,21 @@ fn with_twin(columns: impl Fn(&DMatrix<f64>, &Problem) -> DMatrix<f64>) -> Probl
     p
 }
 
+/// A twin of two amplitudes that are one.
+fn halved() -> Problem {
+    let half = 0.5f64.sqrt();
+    with_twin(|a, _| DMatrix::from_columns(&[half * a.column(0), half * a.column(0)]))
+}
+
+/// What was found, by another name of its room.
+fn renamed(found: &Accepted, name: &str) -> Accepted {
+    let room = found.room.clone();
+    let entry = crate::tests::entry(&room.weighed, name);
+    let candidate = room.weighed.entries[entry].candidate.clone();
+    let judged = room.judge(entry, &quick());
+    Accepted { candidate, judged, set: vec![entry], ..found.clone() }
+}
+
 /// The play with a share of another one's columns.
 fn mixed(share: f64) -> Problem {
     with_twin(|a, p| a + share * own(p, "backlash:3").columns.dense(&p.dwells, 1.0))
@@ -115,8 +130,7 @@ fn mixed(share: f64) -> Problem {
 
 #[test]
 fn the_same_columns_are_a_tie_and_fewer_amplitudes_come_first() {
-    let half = 0.5f64.sqrt();
-    let p = with_twin(|a, _| DMatrix::from_columns(&[half * a.column(0), half * a.column(0)]));
+    let p = halved();
     assert_eq!(settled_sets(&p), [["backlash:1", "twin"]]);
     asked(&p, |found, _| {
         let [one] = &found.accepted[..] else { panic!("one was planted") };
@@ -136,16 +150,12 @@ fn the_same_columns_are_a_tie_and_fewer_amplitudes_come_first() {
 #[test]
 fn what_remains_is_what_the_settled_names_leave() {
     let config = quick();
-    let half = 0.5f64.sqrt();
-    let p = with_twin(|a, _| DMatrix::from_columns(&[half * a.column(0), half * a.column(0)]));
+    let p = halved();
     in_rooms(&p, &config, |rooms| {
         let mut found = search(rooms, &[], &config).unwrap();
-        let room = found.accepted[0].room.clone();
-        let twin = room.weighed.entries.iter().position(|e| e.candidate.spec == "twin").unwrap();
-        let candidate = room.weighed.entries[twin].candidate.clone();
-        found.rest = rooms.with(std::slice::from_ref(&candidate)).unwrap();
-        let judged = room.judge(twin, &config);
-        found.accepted[0] = Accepted { candidate, judged, set: vec![twin], ..found.accepted[0].clone() };
+        let twin = renamed(&found.accepted[0], "twin");
+        found.rest = rooms.with(std::slice::from_ref(&twin.candidate)).unwrap();
+        found.accepted[0] = twin;
         let offers =
             |found: &Search, name: &str| found.rest.weighed.entries.iter().any(|e| e.candidate.spec == name);
         assert!(offers(&found, "backlash:1"));
@@ -359,17 +369,11 @@ fn a_name_and_what_one_step_puts_near_the_best_are_refitted() {
 #[test]
 fn names_that_change_are_confirmed_beside_each_other() {
     let config = quick();
-    let half = 0.5f64.sqrt();
-    let p = with_twin(|a, _| DMatrix::from_columns(&[half * a.column(0), half * a.column(0)]));
+    let p = halved();
     in_rooms(&p, &config, |rooms| {
         let mut found = search(rooms, &[], &config).unwrap();
         let room = found.accepted[0].room.clone();
-        let of = |spec: &str| {
-            let entry = crate::tests::entry(&room.weighed, spec);
-            let candidate = room.weighed.entries[entry].candidate.clone();
-            let judged = room.judge(entry, &config);
-            Accepted { candidate, judged, set: vec![entry], ..found.accepted[0].clone() }
-        };
+        let of = |spec: &str| renamed(&found.accepted[0], spec);
         // What is not there, beside a name that will change: its refits are supposed to stand.
         let (twin, none) = (of("twin"), of("zero_drift:2"));
         let score = |nats: f64| Some(crate::score::tests::score(&[nats, nats + 0.1, nats, nats]));

@@ -1,7 +1,7 @@
 //! The verdict and what it was weighed against, in rows that a table panel shows.
 
 use super::{error_curve, finite, or_zero, short, shown_unlisted, steps};
-use crate::diagnosis_text::{Called, channel_told, driver_told, headline};
+use crate::diagnosis_text::{channel_told, driver_told, headline};
 use crate::explanations::explanations;
 use crate::proto;
 use crate::run::{Answer, Run};
@@ -25,7 +25,7 @@ pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
     proto::Diagnosis {
         timestamp: None,
         verdict: d.verdict.word().into(),
-        sentence: headline(&Called::of(run), d),
+        sentence: headline(&run.called(), d),
         names: d.names.clone(),
         probability: d.probability.and_then(finite),
         p_adjusted: finite(d.p_adjusted),
