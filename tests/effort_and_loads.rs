@@ -155,8 +155,8 @@ fn a_joint_without_effort_costs_only_itself() {
     let largest = &read_json(&out.join("model.json"))["session"]["largest_effort_nm"];
     assert!(largest[1].as_f64().is_some_and(|e| e > 4.0) && largest[2].is_null(), "{largest}");
     // What was written is read again: an arm with the effect, on the same poses.
-    armcal_report::PastObservations::open(&out.join("observations.json")).expect("observations");
-    armcal_report::open_model(&out).expect("a model").arms().expect("its arms");
+    armcal_result::PastObservations::open(&out.join("observations.json")).expect("observations");
+    armcal_result::open_model(&out).expect("a model").arms().expect("its arms");
 
     // What follows the effort of the joint that has none is refused with its name; of another it is fitted.
     let with = |joint: usize| {
@@ -366,7 +366,7 @@ fn a_link_of_a_urdf_without_a_mass_is_named() {
             assert!(warning["message"].as_str().is_some_and(|m| m.contains(says)), "{warning}");
         }
         // The model that is kept for later weighs as much.
-        let past = armcal_report::open_model(&out).expect("a model").arms().expect("its arms");
+        let past = armcal_result::open_model(&out).expect("a model").arms().expect("its arms");
         assert_eq!(past.model.masses(), weighed);
     }
 }

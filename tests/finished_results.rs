@@ -3,7 +3,7 @@
 use crate::support::{armcal, root, run_pipeline};
 use armcal_config::Pipeline;
 use armcal_pipeline::{settle, settle_again};
-use armcal_report::Conclusions;
+use armcal_result::Conclusions;
 use armcal_stages::Silent;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};

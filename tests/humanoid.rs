@@ -91,7 +91,7 @@ fn the_hands_of_one_robot_calibrate_its_arms_and_leave_its_waist_open() {
     }
 
     // What was left of it closes the true poses again, wherever the waist stands.
-    let past = armcal_report::open_model(&out).expect("model.json").arms().expect("the robot");
+    let past = armcal_result::open_model(&out).expect("model.json").arms().expect("the robot");
     let names = past.model.chain().joint_names();
     assert_eq!(names, ["waist", "r_yaw", "r_lift", "r_elbow", "l_yaw", "l_lift", "l_elbow"]);
     let closed = Reference::Joined { to: armcal_core::Against::Feature(FeatureId(1)) };

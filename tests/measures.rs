@@ -1,7 +1,7 @@
 //! Arms measured against points, distances and planes: what a lab without a camera has.
 
 use crate::support::{armcal, number, read_json, root, run_pipeline, shipped, simulate};
-use armcal_report::open_model;
+use armcal_result::open_model;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 

@@ -286,7 +286,7 @@ fn what_is_missing_of_two_arms_is_added_and_the_error_falls_to_the_floor() {
 
     // Where a hand leaves a joint within its play, the plain effect leaves more of it than what was suggested, which is told.
     // The same model predicts again from what was left of it, and another command holds it to a limit.
-    let past = armcal_report::open_model(&out).expect("model.json").arms().expect("the arms");
+    let past = armcal_result::open_model(&out).expect("model.json").arms().expect("the arms");
     assert_eq!(past.model.chain().arms().len(), 2);
     let text = std::fs::read_to_string(&path).expect("pipeline")
         + "\n[[effects]]\nkind = \"backlash\"\ntarget = \"left.joint2\"\n\n[check]\nmax_over_floor = 4.0\n";
@@ -326,7 +326,7 @@ fn what_to_record_next_brings_the_tips_together() {
     // By the calibrated arms of another run of the same recording.
     let folder = tempfile::tempdir().expect("a folder");
     run(&shipped, &folder.path().join("out"));
-    let past = armcal_report::open_model(&folder.path().join("out")).expect("model.json");
+    let past = armcal_result::open_model(&folder.path().join("out")).expect("model.json");
     let arms = past.arms().expect("the arms");
     for dwell in dwells {
         assert_eq!(dwell["where"], "joined", "{dwell}");

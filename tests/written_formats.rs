@@ -3,7 +3,7 @@ use crate::support::{
 };
 use armcal_core::{FeatureId, Parameter, Pose, Unit};
 use armcal_model::{Chain, Frames, Model};
-use armcal_report::{PastArms, PastObservations, open_model};
+use armcal_result::{PastArms, PastObservations, open_model};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;

@@ -42,7 +42,7 @@ pub enum Error {
     Lab(#[from] armcal_lab::LabError),
     /// Reading back the result of an earlier run.
     #[error(transparent)]
-    PastRun(#[from] armcal_report::PastRunError),
+    PastRun(#[from] armcal_result::PastRunError),
     /// Two results of different recordings.
     #[error(
         "{} and {} have no dwell in common ({why}): compare results of the same recordings, and use `armcal verify` to judge a \

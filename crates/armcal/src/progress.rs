@@ -1,6 +1,6 @@
 //! What is being done now, on stderr, when somebody watches.
 
-use armcal_report::printable;
+use armcal_core::printable;
 use armcal_stages::Steps;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write as _;

@@ -3,7 +3,7 @@
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
 use armcal_diagnose::{Calibrated, Diagnosis, Nested, diagnose, nested};
-use armcal_report::{Run, Undiagnosed};
+use armcal_result::{Run, Undiagnosed};
 use armcal_stages::{RunError, Steps};
 
 /// Code of the warning about a diagnosis that could not be made.

@@ -6,7 +6,7 @@ use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
 use armcal_diagnose::{Calibrated, Diagnosis, ParameterReport};
 use armcal_model::EffectSpec;
-use armcal_report::{Refit, Run};
+use armcal_result::{Refit, Run};
 use armcal_stages::{RunError, Steps};
 use rayon::prelude::*;
 

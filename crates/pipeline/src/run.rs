@@ -7,7 +7,7 @@ use armcal_calibrate::calibrate;
 use armcal_config::Pipeline;
 use armcal_model::{EffectSpec, Model};
 use armcal_recording::Recording;
-use armcal_report::Run;
+use armcal_result::Run;
 use armcal_stages::{RunError, Steps, frames, with_effects};
 
 /// Runs a pipeline up to its results in memory; nothing is written.

@@ -8,7 +8,7 @@ use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning}
 use armcal_diagnose::{Diagnosis, Knowledge, Verdict};
 use armcal_model::{Model, Session};
 use armcal_recording::Recording;
-use armcal_report::{Conclusions, Grounds, RecordingRun, Run, Undiagnosed};
+use armcal_result::{Conclusions, Grounds, RecordingRun, Run, Undiagnosed};
 use armcal_setup as setup;
 use armcal_stages::associated::Associated;
 use armcal_stages::{Fitted, Inputs, Rounds, RunError, Seen, Steps, fit_places, frames, perceive};

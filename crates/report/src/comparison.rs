@@ -1,300 +1,107 @@
-//! Two results on the same dwells, for the terminal and for programs.
+//! Two results on the same dwells, for the terminal.
 
-use crate::pairing::{Paired, Unpaired, paired};
-use crate::past_run::{PastResidual, PastRun};
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::proto;
-use crate::text::printable;
-use armcal_calibrate::{Pair, PairedDifference, independent_groups};
+use armcal_core::printable;
 use armcal_core::units::millimetres;
+use armcal_result::{Comparison, Difference, Moved};
 use comfy_table::Cell;
-use serde::Serialize;
 
-/// Dwells listed as most better and most worse.
-const LISTED: usize = 5;
+/// Rows of parameters that moved most.
+const MOVED: usize = 10;
 
-/// What changed from one result to another.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Comparison {
-    /// Effects in the models, before and after.
-    pub effects: [Vec<String>; 2],
-    /// Points that neither fit saw.
-    pub held_out: Option<Difference>,
-    /// All points in both.
-    pub all: Option<Difference>,
-    /// By recording, on the points judged (held out where there are any).
-    pub recordings: Vec<(String, Difference)>,
-    /// Dwells in one result only.
-    pub unmatched: usize,
-    /// Which these are, and why.
-    pub unpaired: Vec<Unpaired>,
-    /// Dwells whose error changed most, most improved first.
-    pub dwells: Vec<DwellChange>,
-    /// Parameters that both have, free in one of them, largest change in standard errors first.
-    pub moved: Vec<Moved>,
-    /// Names of parameters that only the second has.
-    pub added: Vec<String>,
-    /// Names of parameters that only the first has.
-    pub removed: Vec<String>,
+/// The comparison as text, ending in a newline.
+pub fn comparison_text(comparison: &Comparison, style: TerminalStyle) -> String {
+    let pen = Pen { style };
+    let mut sections = vec![pen.section("Position errors [mm], paired by dwell", errors(comparison, &pen))];
+    if !comparison.dwells.is_empty() {
+        sections.push(pen.section("Dwells that changed most [mm]", dwell_table(comparison, &pen)));
+    }
+    sections.push(pen.section("Parameters that moved most", parameter_table(comparison, &pen)));
+    sections.push(format!("{}\n", pen.bold(&comparison_sentence(comparison))));
+    sections.join("\n")
 }
 
-/// A paired difference in millimetres.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Difference {
-    /// Dwells compared.
-    pub n: usize,
-    /// Groups treated as independent: cavities, or single dwells where the tip was tracked or cavities are few.
-    pub groups: usize,
-    /// Mean error before [mm].
-    pub before_mm: f64,
-    /// Mean error after [mm].
-    pub after_mm: f64,
-    /// After minus before [mm].
-    pub difference_mm: f64,
-    /// 95 % interval of it [mm]; null where there are fewer than two groups.
-    pub ci95_mm: Option<[f64; 2]>,
-    /// Dwells whose error fell.
-    pub better: usize,
-    /// Dwells whose error rose.
-    pub worse: usize,
+/// The result in one sentence.
+pub fn comparison_sentence(comparison: &Comparison) -> String {
+    let (points, d) = match (&comparison.held_out, &comparison.all) {
+        (Some(d), _) => ("held-out points", d),
+        (None, Some(d)) => ("points (nothing was held out of both)", d),
+        (None, None) => {
+            return "The two results have no dwell in common, so there is nothing to compare.".into();
+        }
+    };
+    let verdict = match d.ci95_mm {
+        Some([_, high]) if high < 0.0 => "falls",
+        Some([low, _]) if low > 0.0 => "rises",
+        _ => "does not change by more than chance:",
+    };
+    let numbers = if verdict.ends_with(':') { "" } else { " from" };
+    let interval = d.ci95_mm.map_or(String::new(), |[low, high]| {
+        format!(" (difference {:+.3} mm, 95 % {low:+.3} to {high:+.3})", d.difference_mm)
+    });
+    let (before, after) = (millimetres(d.before_mm * 1e-3), millimetres(d.after_mm * 1e-3));
+    format!("On {} {points} the mean error {verdict}{numbers} {before} to {after} mm{interval}.", d.n)
 }
 
-/// The error of one dwell in both results.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DwellChange {
-    /// Name of the recording.
-    pub recording: String,
-    /// Index of the dwell.
-    pub dwell: usize,
-    /// Cavity; empty when the tip was tracked.
-    pub cavity: String,
-    /// Error before [mm].
-    pub before_mm: f64,
-    /// Error after [mm].
-    pub after_mm: f64,
+fn errors(comparison: &Comparison, pen: &Pen) -> String {
+    let mut table =
+        pen.table(&["points", "n", "groups", "before", "after", "difference", "95 %", "better", "worse"]);
+    for (name, d) in comparison.differences() {
+        let mut row = vec![Cell::new(printable(&name)), number(d.n), number(d.groups)];
+        row.extend(difference_shown(&d, "-").map(number));
+        row.extend([d.better, d.worse].map(number));
+        table.add_row(row);
+    }
+    let mut text = pen.render(&table);
+    if !comparison.unpaired.is_empty() {
+        text.push_str(&pen.list(comparison.unpaired.iter().map(|u| ("left out", printable(&u.to_string())))));
+    }
+    text
 }
 
-/// A parameter in both results.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Moved {
-    /// Its name.
-    pub name: String,
-    /// Unit of the numbers.
-    pub unit: String,
-    /// Before.
-    pub before: f64,
-    /// After.
-    pub after: f64,
-    /// Change in units of the joint 95 % half width; above 1 the intervals do not explain it.
-    pub in_half_widths: f64,
+fn dwell_table(comparison: &Comparison, pen: &Pen) -> String {
+    let mut table = pen.table(&["recording", "dwell", "cavity", "before", "after", "change"]);
+    for d in &comparison.dwells {
+        table.add_row(vec![
+            Cell::new(printable(&d.recording)),
+            number(d.dwell),
+            Cell::new(printable(&d.cavity)),
+            number(format!("{:.3}", d.before_mm)),
+            number(format!("{:.3}", d.after_mm)),
+            number(format!("{:+.3}", d.after_mm - d.before_mm)),
+        ]);
+    }
+    pen.render(&table)
 }
 
-impl Comparison {
-    /// Compares dwell by dwell: the same time of the same recording, whatever it is called in each result.
-    pub fn of(before: &PastRun, after: &PastRun) -> Comparison {
-        let Paired { pairs: matched, unpaired } = paired(before, after);
-        let held: Vec<_> = matched.iter().copied().filter(|(b, a)| b.held_out && a.held_out).collect();
-        let judged = if held.is_empty() { &matched } else { &held };
-        let (added, removed) = (only_in(after, before), only_in(before, after));
-        Comparison {
-            effects: [before.effects.clone(), after.effects.clone()],
-            held_out: difference(&held),
-            all: difference(&matched),
-            recordings: by_recording(judged),
-            unmatched: unpaired.iter().map(|u| u.dwells).sum(),
-            unpaired,
-            dwells: most_changed(judged),
-            moved: moved(before, after),
-            added,
-            removed,
+fn parameter_table(comparison: &Comparison, pen: &Pen) -> String {
+    let mut table = pen.table(&["parameter", "unit", "before", "after", "change", "in 95 % widths"]);
+    for m in comparison.moved.iter().take(MOVED) {
+        let name = [Cell::new(printable(&m.name)), Cell::new(&m.unit)];
+        table.add_row(name.into_iter().chain(moved_shown(m).map(number)).collect::<Vec<Cell>>());
+    }
+    let mut text = pen.render(&table);
+    for (what, names) in [("Only after", &comparison.added), ("Only before", &comparison.removed)] {
+        if !names.is_empty() {
+            text.push_str(&format!(" {what}: {}\n", printable(&names.join(", "))));
         }
     }
-
-    /// Held out, all, then each recording.
-    pub(crate) fn differences(&self) -> Vec<(String, Difference)> {
-        let whole = [("held out", self.held_out), ("all", self.all)];
-        let whole = whole.into_iter().filter_map(|(name, d)| Some((name.to_owned(), d?)));
-        whole.chain(self.recordings.iter().cloned()).collect()
-    }
-
-    /// The comparison as text, ending in a newline.
-    pub fn terminal(&self, style: TerminalStyle) -> String {
-        let pen = Pen { style };
-        let mut sections = vec![pen.section("Position errors [mm], paired by dwell", self.errors(&pen))];
-        if !self.dwells.is_empty() {
-            sections.push(pen.section("Dwells that changed most [mm]", self.dwell_table(&pen)));
-        }
-        sections.push(pen.section("Parameters that moved most", self.parameter_table(&pen)));
-        sections.push(format!("{}\n", pen.bold(&self.sentence())));
-        sections.join("\n")
-    }
-
-    /// The result in one sentence.
-    pub fn sentence(&self) -> String {
-        let (points, d) = match (&self.held_out, &self.all) {
-            (Some(d), _) => ("held-out points", d),
-            (None, Some(d)) => ("points (nothing was held out of both)", d),
-            (None, None) => {
-                return "The two results have no dwell in common, so there is nothing to compare.".into();
-            }
-        };
-        let verdict = match d.ci95_mm {
-            Some([_, high]) if high < 0.0 => "falls",
-            Some([low, _]) if low > 0.0 => "rises",
-            _ => "does not change by more than chance:",
-        };
-        let numbers = if verdict.ends_with(':') { "" } else { " from" };
-        let interval = d.ci95_mm.map_or(String::new(), |[low, high]| {
-            format!(" (difference {:+.3} mm, 95 % {low:+.3} to {high:+.3})", d.difference_mm)
-        });
-        let (before, after) = (millimetres(d.before_mm * 1e-3), millimetres(d.after_mm * 1e-3));
-        format!("On {} {points} the mean error {verdict}{numbers} {before} to {after} mm{interval}.", d.n)
-    }
-
-    fn errors(&self, pen: &Pen) -> String {
-        let mut table =
-            pen.table(&["points", "n", "groups", "before", "after", "difference", "95 %", "better", "worse"]);
-        for (name, d) in self.differences() {
-            let mut row = vec![Cell::new(printable(&name)), number(d.n), number(d.groups)];
-            row.extend(d.shown("-").map(number));
-            row.extend([d.better, d.worse].map(number));
-            table.add_row(row);
-        }
-        let mut text = pen.render(&table);
-        if !self.unpaired.is_empty() {
-            text.push_str(&pen.list(self.unpaired.iter().map(|u| ("left out", printable(&u.to_string())))));
-        }
-        text
-    }
-
-    fn dwell_table(&self, pen: &Pen) -> String {
-        let mut table = pen.table(&["recording", "dwell", "cavity", "before", "after", "change"]);
-        for d in &self.dwells {
-            table.add_row(vec![
-                Cell::new(printable(&d.recording)),
-                number(d.dwell),
-                Cell::new(printable(&d.cavity)),
-                number(format!("{:.3}", d.before_mm)),
-                number(format!("{:.3}", d.after_mm)),
-                number(format!("{:+.3}", d.after_mm - d.before_mm)),
-            ]);
-        }
-        pen.render(&table)
-    }
-
-    fn parameter_table(&self, pen: &Pen) -> String {
-        let mut table = pen.table(&["parameter", "unit", "before", "after", "change", "in 95 % widths"]);
-        for m in self.moved.iter().take(2 * LISTED) {
-            let name = [Cell::new(printable(&m.name)), Cell::new(&m.unit)];
-            table.add_row(name.into_iter().chain(m.shown().map(number)).collect::<Vec<Cell>>());
-        }
-        let mut text = pen.render(&table);
-        for (what, names) in [("Only after", &self.added), ("Only before", &self.removed)] {
-            if !names.is_empty() {
-                text.push_str(&format!(" {what}: {}\n", printable(&names.join(", "))));
-            }
-        }
-        text
-    }
+    text
 }
 
-impl Difference {
-    /// Before, after, the change and its interval, or `none` where there is no interval.
-    pub(crate) fn shown(&self, none: &str) -> [String; 4] {
-        let interval = self.ci95_mm.map(|[low, high]| format!("{low:+.3} to {high:+.3}"));
-        [
-            millimetres(self.before_mm * 1e-3),
-            millimetres(self.after_mm * 1e-3),
-            format!("{:+.3}", self.difference_mm),
-            interval.unwrap_or_else(|| none.to_owned()),
-        ]
-    }
+/// Before, after, the change and its interval, or `none` where there is no interval.
+pub(crate) fn difference_shown(d: &Difference, none: &str) -> [String; 4] {
+    let interval = d.ci95_mm.map(|[low, high]| format!("{low:+.3} to {high:+.3}"));
+    [
+        millimetres(d.before_mm * 1e-3),
+        millimetres(d.after_mm * 1e-3),
+        format!("{:+.3}", d.difference_mm),
+        interval.unwrap_or_else(|| none.to_owned()),
+    ]
 }
 
-impl Moved {
-    /// Before, after, the change, and that in half widths.
-    pub(crate) fn shown(&self) -> [String; 4] {
-        let [before, after] = [self.before, self.after].map(|v| format!("{v:.4}"));
-        [before, after, format!("{:+.4}", self.after - self.before), format!("{:.1}", self.in_half_widths)]
-    }
-}
-
-fn difference(rows: &[(&PastResidual, &PastResidual)]) -> Option<Difference> {
-    let dwells: Vec<_> = rows.iter().map(|(_, a)| (a.dwell.to_string(), Some(a.cavity.as_str()))).collect();
-    let pairs: Vec<Pair> = rows
-        .iter()
-        .zip(independent_groups(&dwells))
-        .map(|((b, a), group)| Pair { group, before_m: b.error_m, after_m: a.error_m })
-        .collect();
-    let d = PairedDifference::of(&pairs)?;
-    let mm = |m: f64| m * 1e3;
-    Some(Difference {
-        n: d.n,
-        groups: d.groups,
-        before_mm: mm(d.before_m),
-        after_mm: mm(d.after_m),
-        difference_mm: mm(d.difference_m),
-        ci95_mm: d.ci95_m[0].is_finite().then_some(d.ci95_m.map(mm)),
-        better: d.better,
-        worse: d.worse,
-    })
-}
-
-fn by_recording(rows: &[(&PastResidual, &PastResidual)]) -> Vec<(String, Difference)> {
-    let mut names: Vec<&str> = Vec::new();
-    for (_, a) in rows {
-        if !names.contains(&a.recording.as_str()) {
-            names.push(&a.recording);
-        }
-    }
-    let of = |name: &str| rows.iter().copied().filter(|(_, a)| a.recording == name).collect::<Vec<_>>();
-    names.iter().filter_map(|name| difference(&of(name)).map(|d| ((*name).to_owned(), d))).collect()
-}
-
-/// The most improved dwells, then the most worsened.
-fn most_changed(rows: &[(&PastResidual, &PastResidual)]) -> Vec<DwellChange> {
-    let mut all: Vec<DwellChange> = rows
-        .iter()
-        .map(|(b, a)| DwellChange {
-            recording: a.recording.clone(),
-            dwell: a.dwell.dwell,
-            cavity: a.cavity.clone(),
-            before_mm: b.error_m * 1e3,
-            after_mm: a.error_m * 1e3,
-        })
-        .collect();
-    all.sort_by(|x, y| (x.after_mm - x.before_mm).total_cmp(&(y.after_mm - y.before_mm)));
-    if all.len() > 2 * LISTED {
-        all.drain(LISTED..all.len() - LISTED);
-    }
-    all
-}
-
-fn moved(before: &PastRun, after: &PastRun) -> Vec<Moved> {
-    let mut moved: Vec<Moved> = after
-        .parameters
-        .iter()
-        .filter_map(|a| before.parameters.iter().find(|b| b.name == a.name).map(|b| (b, a)))
-        .filter(|(b, a)| b.free || a.free)
-        .map(|(b, a)| Moved {
-            name: a.name.clone(),
-            unit: a.display_unit.clone(),
-            before: b.display_value,
-            after: a.display_value,
-            in_half_widths: in_half_widths(b, a),
-        })
-        .collect();
-    moved.sort_by(|x, y| y.in_half_widths.total_cmp(&x.in_half_widths));
-    moved
-}
-
-fn in_half_widths(b: &proto::Parameter, a: &proto::Parameter) -> f64 {
-    let change = (a.display_value - b.display_value).abs();
-    let width = a.display_ci95_half.hypot(b.display_ci95_half);
-    if change == 0.0 { 0.0 } else { change / width }
-}
-
-fn only_in(one: &PastRun, other: &PastRun) -> Vec<String> {
-    let has = |run: &PastRun, name: &str| run.parameters.iter().any(|p| p.name == name);
-    one.parameters.iter().filter(|p| !has(other, &p.name)).map(|p| p.name.clone()).collect()
+/// Before, after, the change, and that in half widths.
+pub(crate) fn moved_shown(m: &Moved) -> [String; 4] {
+    let [before, after] = [m.before, m.after].map(|v| format!("{v:.4}"));
+    [before, after, format!("{:+.4}", m.after - m.before), format!("{:.1}", m.in_half_widths)]
 }

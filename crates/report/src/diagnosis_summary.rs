@@ -1,8 +1,7 @@
 //! The `diagnosis` of `summary.json`: names as in the contract; whatever else the diagnosis knows follows them.
 
-use crate::diagnosis_text::pasted;
-use crate::explanations::explanations;
 use armcal_diagnose::{BeforeAfter, CandidateReport, Diagnosis, ParameterReport, UnknownReport};
+use armcal_wording::{explanations, pasted};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 

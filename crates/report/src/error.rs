@@ -13,31 +13,19 @@ pub enum ReportError {
     /// A file cannot be written, or an input not be passed through.
     #[error("writing {}: {source}", path.display())]
     Write { path: PathBuf, source: Box<armcal_recording::RecordingError> },
-    /// A recording cannot be read once more for its hash.
-    #[error("hashing a recording for the summary: {0}")]
-    Hash(Box<armcal_recording::RecordingError>),
     /// A table cannot be encoded as Parquet.
     #[error("encoding the table {table} as Parquet: {source}")]
     Parquet { table: &'static str, source: Box<dyn std::error::Error + Send + Sync> },
     /// The parameters cannot be written as TOML.
     #[error("encoding the parameters as TOML: {0}")]
     Toml(#[from] toml::ser::Error),
-    /// The calibrated model cannot be written.
-    #[error("writing the calibrated model: {0}")]
-    Model(#[source] Box<armcal_model::ModelError>),
     /// The data of the page, or a summary, cannot be written as JSON.
     #[error("encoding the report's data as JSON: {0}")]
     Page(#[source] serde_json::Error),
     /// The page's template cannot be filled in.
     #[error("writing the report page: {0}")]
     Template(#[from] askama::Error),
-    /// The run contradicts itself; a bug of whoever put it together.
-    #[error("the run is inconsistent: {0}")]
-    Inconsistent(String),
-}
-
-impl From<armcal_model::ModelError> for ReportError {
-    fn from(source: armcal_model::ModelError) -> ReportError {
-        ReportError::Model(Box::new(source))
-    }
+    /// The run cannot be written as what its results are read back from.
+    #[error(transparent)]
+    Result(#[from] armcal_result::ResultError),
 }

@@ -1,22 +1,14 @@
 //! `run.mcap`: the input's messages untouched, the result channels, attachments and metadata.
 
-use crate::channels::{PREFIX, ResultMessage, messages, run_end_ns};
+use crate::channels::{ResultMessage, messages, run_end_ns};
 use crate::findings::Findings;
-use crate::points::Point;
-use crate::run::{Run, VERSION};
-use armcal_core::{Severity, Stage, Warning};
 use armcal_recording::atomic::AtomicFile;
 use armcal_recording::output::McapOutput;
 use armcal_recording::{RawChannel, Recording, RecordingError};
+use armcal_result::{INPUT_METADATA, OWN, PREFIX, Point, Run, VERSION};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::path::Path;
-
-/// Beginning of the names of armcal's attachments and metadata records.
-pub(crate) const OWN: &str = "armcal/";
-
-/// Name of the metadata record with names and hashes of the input files.
-pub(crate) const INPUT_METADATA: &str = "armcal/input";
 
 /// A result file attached to the recording.
 pub(crate) struct Attachment<'a> {
@@ -65,22 +57,6 @@ pub(crate) fn write_results(
         out.metadata(name, entries)?;
     }
     out.stage()
-}
-
-/// Messages of the input that are left out because armcal itself wrote them, one warning a recording.
-pub(crate) fn earlier_results(run: &Run) -> Vec<Warning> {
-    let of_recording = |r: &crate::RecordingRun| {
-        let own = r.report.channels.iter().filter(|c| c.topic.starts_with(PREFIX));
-        let count: u64 = own.map(|c| c.messages).sum();
-        (count > 0).then(|| {
-            let (messages, are) =
-                if count == 1 { ("message", "is a result") } else { ("messages", "are results") };
-            let message =
-                format!("{count} {messages} under {PREFIX} {are} of an earlier run, left out of run.mcap");
-            Warning::new(Severity::Notice, Stage::Output, "earlier-results-left-out", &r.name, message)
-        })
-    };
-    run.recordings.iter().filter_map(of_recording).collect()
 }
 
 fn copy_messages(input: &Recording, out: &mut McapOutput) -> Result<(), RecordingError> {

@@ -1,10 +1,10 @@
 //! `parameters.toml`: what the calibration says about every parameter and frame, for programs and people.
 
 use crate::ReportError;
-use crate::run::{Run, VERSION, role_word};
 use armcal_calibrate::Estimate;
 use armcal_core::{FeatureId, Pose, RollPitchYaw};
 use armcal_recording::sealed;
+use armcal_result::{Run, VERSION, role_word};
 use serde::Serialize;
 
 const HEADER: &str = "\
@@ -67,7 +67,7 @@ pub(crate) fn parameters_toml(run: &Run) -> Result<String, ReportError> {
     let file = File {
         pipeline: &run.pipeline_name,
         version: VERSION,
-        conclusion: crate::conclusion(&run.calibration),
+        conclusion: armcal_wording::conclusion(&run.calibration),
         undetermined: fit.undetermined.iter().map(|u| u.text.as_str()).collect(),
         parameters: fit.estimates.iter().map(entry).collect(),
         frames: frames(run),

@@ -1,10 +1,9 @@
 //! The diagnosis of results without [`crate::Conclusions`], from their `summary.json`.
 
 use crate::diagnosis_text::{PASTE, PREDICTED, RANKED, behind};
-use crate::past_run::PastRun;
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::recording_names::RecordingNames;
-use crate::text::printable;
+use armcal_core::printable;
+use armcal_result::{PastRun, RecordingNames};
 use comfy_table::Cell;
 use serde_json::Value;
 

@@ -2,10 +2,10 @@
 //!
 //! The names are a contract (`armcal.pool/1`): fields are added, never renamed. Every number is finite or `null`.
 
-use crate::run::{RecordingErrors, RecordingRun, Run, VERSION};
 use crate::summary::{error_summary, fit, parameter, side};
-use crate::text::conclusion;
 use armcal_calibrate::Calibration;
+use armcal_result::{RecordingErrors, RecordingRun, Run, VERSION};
+use armcal_wording::{answer, conclusion};
 use serde_json::{Value, json};
 
 /// Version of the contract.
@@ -21,7 +21,7 @@ pub fn pool_json(run: &Run) -> String {
     let shared: Vec<usize> = (0..estimates.len()).filter(is_shared).collect();
     let mut of_fit = fit(&run.calibration);
     of_fit["parameters"] = shared.iter().map(|&index| parameter(&estimates[index])).collect();
-    let answer = run.answer();
+    let answer = answer(run);
     let recordings = run.recordings.iter().zip(run.errors_by_recording()).zip(&own);
     let transfer =
         |c: &Calibration| json!({ "noise_floor_mm": c.noise_floor_m * 1e3, "unseen": side(&c.holdout) });

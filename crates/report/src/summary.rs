@@ -8,16 +8,14 @@
 //! the calibrated parameters. On the `holdout` side both are predictions for points no fit saw.
 
 use crate::ReportError;
-use crate::by_marker::by_marker;
 use crate::diagnosis_summary::diagnosis_summary;
 use crate::parameters::frames;
-use crate::past_model::visited;
-use crate::run::{RecordingRun, Refit, Run, VERSION};
-use crate::text::conclusion;
-use crate::two_arms::TwoArms;
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::{Dwell, ErrorStats, Visited};
+use armcal_result::by_marker::by_marker;
+use armcal_result::{RecordingRun, Refit, Run, TwoArms, VERSION, visited};
 use armcal_table::{Assignment, Place};
+use armcal_wording::{answer, conclusion};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -33,7 +31,7 @@ pub fn summary_json(run: &Run) -> Result<String, ReportError> {
 }
 
 fn summary(run: &Run) -> Result<Value, ReportError> {
-    let answer = run.answer();
+    let answer = answer(run);
     let begin = json!({
         "schema": SCHEMA,
         "version": VERSION,
@@ -152,8 +150,8 @@ fn refit(refit: &Refit) -> Value {
 pub(crate) fn fit(c: &Calibration) -> Value {
     json!({
         "objective": c.fit.objective,
-        "effects": crate::run::effects(c),
-        "status": crate::run::status_word(c.fit.status),
+        "effects": armcal_result::effects(c),
+        "status": armcal_result::status_word(c.fit.status),
         "iterations": c.fit.iterations,
         "noise_floor_mm": c.noise_floor_m * 1e3,
         "sigma_scale": c.fit.sigma_scale,
@@ -198,7 +196,7 @@ pub(crate) fn parameter(e: &Estimate) -> Value {
         "determined": e.determined,
         "at_bound": e.at_bound,
         "free": e.parameter.free,
-        "role": crate::run::role_word(e.parameter.role),
+        "role": armcal_result::role_word(e.parameter.role),
     })
 }
 

@@ -2,10 +2,9 @@
 //! does not exist is null. Columns of joints are numbered from 1 in the order of the model's joints.
 
 use crate::ReportError;
-use crate::points::Point;
-use crate::run::{RecordingRun, Run, role_word};
 use armcal_calibrate::Estimate;
 use armcal_core::{Dwell, DwellId, Observation};
+use armcal_result::{Point, RecordingRun, Run, role_word};
 use armcal_table::{Assignment, Place};
 use nalgebra::Vector3;
 use polars::polars_utils::compression::ZstdLevel;

@@ -1,15 +1,12 @@
 //! The summary a person reads in the terminal: the story in one screen, or everything.
 
-use crate::by_marker::{MarkerErrors, by_marker};
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::run::{Run, Status, VERSION};
-use crate::story::{SHOWN, Story};
-use crate::text::{estimate_shown, printable, remark};
-use crate::told_warning::ToldWarning;
-use crate::two_arms::{about, errors_are};
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::units::millimetres;
-use armcal_core::{ErrorStats, Severity};
+use armcal_core::{ErrorStats, Severity, printable};
+use armcal_result::by_marker::{MarkerErrors, by_marker};
+use armcal_result::{Run, Status, VERSION};
+use armcal_wording::{SHOWN, Story, ToldWarning, about, errors_are, estimate_shown, remark};
 use comfy_table::Cell;
 
 /// How much of a run is told.

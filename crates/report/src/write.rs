@@ -1,22 +1,21 @@
 //! All files of a run, in one folder.
 
-use crate::conclusions::{self, Conclusions};
 use crate::findings::Findings;
 use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
-use crate::model_file::{self, ModelFile, model_files};
-use crate::page::{Basis, PageKind, report_html};
+use crate::page::{PageKind, report_html};
 use crate::parameters::parameters_toml;
-use crate::past_model;
-use crate::past_observations::{OBSERVATIONS_FILE, observations_json};
-use crate::past_run::{RUN, SUMMARY};
-use crate::points::points;
 use crate::pool_json::{self, pool_json};
 use crate::tables::{self, parquet_files};
-use crate::{ReportError, Run, summary_json};
+use crate::{ReportError, summary_json};
 use armcal_config::{InputMessages, OutputConfig};
 use armcal_recording::atomic::AtomicFile;
 use armcal_recording::{Recording, RecordingError, make_folder};
+use armcal_result::levers::Basis;
+use armcal_result::{
+    CONCLUSIONS_FILE, Conclusions, ModelFile, OBSERVATIONS_FILE, RUN, ResultError, Run, SUMMARY,
+    model_file_name, model_files, model_of, observations_json, points,
+};
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -45,12 +44,14 @@ pub fn write_all(
 ) -> Result<Vec<PathBuf>, ReportError> {
     if config.input == InputMessages::Copy && recordings.len() != run.recordings.len() {
         let (opened, named) = (recordings.len(), run.recordings.len());
-        return Err(ReportError::Inconsistent(format!("{opened} recordings opened for {named} in the run")));
+        return Err(
+            ResultError::Inconsistent(format!("{opened} recordings opened for {named} in the run")).into()
+        );
     }
     let points = points(run)?;
     let models = model_files(run)?;
     let parameters = parameters_toml(run)?;
-    let past_model = past_model::of_run(run)?.json().map_err(ReportError::Page)?;
+    let past_model = model_of(run)?.json().map_err(ReportError::Page)?;
     // Observations of earlier results are where they were read, and a second copy of them would be pooled with them.
     let observations = match run.is_pool() {
         true => (pool_json::FILE, pool_json(run)),
@@ -95,7 +96,7 @@ pub fn write_all(
     attachments.splice(4..4, of_models);
     let concluded = Conclusions::of(run).map(|conclusions| conclusions.text()).transpose()?;
     let concluded = concluded.as_deref();
-    let named = |text| Attachment { name: conclusions::FILE, media_type: "application/toml", text };
+    let named = |text| Attachment { name: CONCLUSIONS_FILE, media_type: "application/toml", text };
     attachments.extend(concluded.map(named));
     let to_copy = config.copied(recordings);
     let mcap_path = out_dir.join(RUN);
@@ -127,7 +128,7 @@ fn files<'a>(
     arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
     observations: &str,
 ) -> Vec<PathBuf> {
-    let models = arms.into_iter().map(|(arm, urdf)| model_file::name(arm, urdf));
+    let models = arms.into_iter().map(|(arm, urdf)| model_file_name(arm, urdf));
     let fixed =
         [RUN, REPORT, SUMMARY, PARAMETERS, armcal_model_file::FILE, observations, LAYOUT, LAYOUT_LEGACY];
     let fixed = fixed.into_iter().chain(tables::FILES).map(str::to_owned);
@@ -143,7 +144,7 @@ pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
     let texts = [
         (SUMMARY, summary_json(run)?),
         (PARAMETERS, parameters_toml(run)?),
-        (armcal_model_file::FILE, past_model::of_run(run)?.json().map_err(ReportError::Page)?),
+        (armcal_model_file::FILE, model_of(run)?.json().map_err(ReportError::Page)?),
         (OBSERVATIONS_FILE, observations_json(run)?),
     ];
     for (name, text) in texts {

@@ -5,7 +5,7 @@ use crate::error::Error;
 use armcal_config::ConfigError;
 use armcal_config::{Pipeline, RecordingEntry};
 use armcal_recording::{atomic, identity_of, input, make_folder_in, read_with};
-use armcal_report::VERSION;
+use armcal_result::VERSION;
 use armcal_stages::RunError;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};

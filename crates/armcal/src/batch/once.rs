@@ -3,7 +3,8 @@
 use super::store::Store;
 use crate::error::Error;
 use armcal_campaign::Row;
-use armcal_report::{DwellMark, Repeat, also_in};
+use armcal_report::Repeat;
+use armcal_result::{DwellMark, also_in};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 

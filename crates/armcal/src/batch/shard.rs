@@ -3,7 +3,8 @@
 use super::store;
 use crate::error::Error;
 use armcal_recording::{input, make_folder_in};
-use armcal_report::{FailedRecording, VERSION};
+use armcal_report::FailedRecording;
+use armcal_result::VERSION;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;

@@ -3,7 +3,8 @@
 use crate::error::Error;
 use armcal_campaign::Row;
 use armcal_recording::{atomic, input, make_folder_in};
-use armcal_report::{DwellMark, OBSERVATIONS_FILE, PastObservations, ReportError};
+use armcal_report::ReportError;
+use armcal_result::{DwellMark, OBSERVATIONS_FILE, PastObservations};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;

@@ -8,7 +8,8 @@ use super::measured::Check;
 use super::reasons;
 use super::reference::{Calibrated, FittedFrame};
 use armcal_core::Pose;
-use armcal_report::{Run, printable};
+use armcal_core::printable;
+use armcal_result::Run;
 
 /// A frame in both results.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,8 +7,9 @@ use super::reference::Calibrated;
 use super::{frame_shifts, shifts, verdict};
 use crate::error::Error;
 use armcal_core::Severity;
+use armcal_core::printable;
 use armcal_diagnose::Verdict;
-use armcal_report::{Run, VERSION, printable};
+use armcal_result::{Run, VERSION};
 use serde::Serialize;
 
 /// Version of the JSON.

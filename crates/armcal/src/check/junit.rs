@@ -4,7 +4,7 @@
 
 use super::{Check, Judged};
 use crate::error::Error;
-use armcal_report::VERSION;
+use armcal_result::VERSION;
 use quick_junit::{NonSuccessKind, Property, Report, TestCase, TestCaseStatus, TestSuite};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, Writer};

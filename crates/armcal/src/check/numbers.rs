@@ -3,8 +3,9 @@
 use super::limits::Limits;
 use super::measured::Check;
 use super::reasons;
+use armcal_core::printable;
 use armcal_core::{ErrorStats, Severity, Warning};
-use armcal_report::{RecordingRun, Run, printable};
+use armcal_result::{RecordingRun, Run};
 
 /// Errors on points that the fit did not see.
 pub fn errors(run: &Run, limits: &Limits) -> Vec<Check> {

@@ -3,10 +3,12 @@
 use super::limits::Limits;
 use super::numbers::{all_warnings, listed_up};
 use armcal_calibrate::Estimate;
+use armcal_core::printable;
 use armcal_core::{Role, Severity};
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport};
 use armcal_model::{EffectSpec, Since, Target};
-use armcal_report::{Run, Status, amplitude_text, channel_told, driver_told, look_at, printable};
+use armcal_result::{Run, Status};
+use armcal_wording::{amplitude_text, channel_told, driver_told, look_at};
 
 /// Everything the run says about what is wrong, the most telling first: bodies that moved, effects found, shapes
 /// without a name, parameters on their bounds, warnings.

@@ -3,7 +3,8 @@
 use crate::error::Error;
 use armcal_core::{Pose, RollPitchYaw};
 use armcal_recording::input;
-use armcal_report::{PastRun, Run, SCHEMA, summary_json};
+use armcal_report::{SCHEMA, summary_json};
+use armcal_result::{PastRun, Run};
 use serde::Deserialize;
 use std::path::Path;
 

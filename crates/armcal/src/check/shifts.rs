@@ -5,7 +5,8 @@ use super::measured::Check;
 use super::numbers::listed_up;
 use super::reasons;
 use super::reference::{Calibrated, FittedParameter};
-use armcal_report::{Run, printable};
+use armcal_core::printable;
+use armcal_result::Run;
 
 /// A parameter in both results.
 #[derive(Debug, Clone, PartialEq)]

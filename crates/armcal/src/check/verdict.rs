@@ -5,7 +5,7 @@ use super::measured::{Check, Measured};
 use super::reasons;
 use armcal_diagnose::{Diagnosis, Verdict};
 use armcal_model::EffectSpec;
-use armcal_report::Run;
+use armcal_result::Run;
 
 /// Whether the verdict is one of the right ones, or all that is missing may be.
 ///
@@ -39,7 +39,7 @@ pub fn verdict(run: &Run, limits: &Limits) -> Option<Check> {
         said: String::new(),
         why: Vec::new(),
     };
-    let said = uncapitalised(&run.answer().sentence);
+    let said = uncapitalised(&armcal_wording::answer(&run).sentence);
     Some(check.saying(said, || reasons::of_run(run, limits)))
 }
 

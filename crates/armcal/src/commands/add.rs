@@ -13,8 +13,10 @@ use armcal_diagnose::{Diagnosis, Nested};
 use armcal_model::EffectSpec;
 use armcal_pipeline::Settled;
 use armcal_recording::atomic;
-use armcal_report::{Comparison, PastRun, Status, diagnosis_text, nested_sentence, write_all};
+use armcal_report::{comparison_text, diagnosis_text, write_all};
+use armcal_result::{Comparison, PastRun, Status};
 use armcal_stages::{Fitted, frames};
+use armcal_wording::nested_sentence;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -112,7 +114,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         for LeftOut { effect, reason } in &left_out {
             print(&format!("Left out: {}: {reason}\n\n", run.in_words(effect)))?;
         }
-        print(&comparison.terminal(style()))?;
+        print(&comparison_text(&comparison, style()))?;
         for transfer in &transfer {
             print(&format!("\nTransfer: {}.\n", run.in_words(&transfer.sentence())))?;
         }

@@ -6,7 +6,8 @@ use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_recording::input;
-use armcal_report::{Campaign, Status, campaign_files, campaign_json, campaign_text};
+use armcal_report::{Campaign, campaign_files, campaign_json, campaign_text};
+use armcal_result::Status;
 use std::path::{Path, PathBuf};
 
 /// What a user asked for.

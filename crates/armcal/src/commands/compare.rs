@@ -3,7 +3,8 @@
 use super::{Outcome, may_write, print, style};
 use crate::error::Error;
 use armcal_recording::atomic;
-use armcal_report::{Comparison, PastRun, comparison_html};
+use armcal_report::{comparison_html, comparison_text};
+use armcal_result::{Comparison, PastRun};
 use std::path::Path;
 
 /// Compares two results, prints the table (or JSON), and writes the page if one is wanted.
@@ -21,7 +22,7 @@ pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Resu
     if json {
         print(&super::json_text(&comparison)?)?;
     } else {
-        print(&comparison.terminal(style()))?;
+        print(&comparison_text(&comparison, style()))?;
     }
     Ok(Outcome::Done)
 }

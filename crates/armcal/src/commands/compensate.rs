@@ -8,7 +8,7 @@ use armcal_compensate::{Compensator, Drive, SetPoint, TargetFrame, resample};
 use armcal_core::{FeatureId, Load};
 use armcal_model::Model;
 use armcal_recording::atomic;
-use armcal_report::{PastArms, PastModel, open_model};
+use armcal_result::{PastArms, PastModel, open_model};
 use clap::Args;
 use std::path::PathBuf;
 

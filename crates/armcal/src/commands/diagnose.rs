@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{Conclusions, PastRun, Status, diagnosis_text, past_diagnosis, summary_json};
+use armcal_report::{concluded_text, diagnosis_text, past_diagnosis, summary_json};
+use armcal_result::{Conclusions, PastRun, Status};
 use std::path::Path;
 
 /// Diagnoses a pipeline, or prints the diagnosis of a finished run (`run.mcap` or its folder).
@@ -16,7 +17,9 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
             print(&super::json_text(&past.summary["diagnosis"])?)?;
         } else {
             let concluded = Conclusions::open(input)?;
-            print(&concluded.map_or_else(|| past_diagnosis(&past, style()), |c| c.diagnosis_text(style())))?;
+            print(
+                &concluded.map_or_else(|| past_diagnosis(&past, style()), |c| concluded_text(&c, style())),
+            )?;
         }
         let lost = past.summary["status"] == Status::DataLost.word();
         if lost {

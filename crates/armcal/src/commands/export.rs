@@ -7,7 +7,7 @@ use armcal_calibrate::position_covariance_m2;
 use armcal_config::Pipeline;
 use armcal_core::{Observation, Parameter, Pose, Reference};
 use armcal_recording::atomic;
-use armcal_report::Run;
+use armcal_result::Run;
 use nalgebra::SMatrix;
 use serde_json::{Value, json};
 use std::path::Path;

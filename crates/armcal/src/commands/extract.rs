@@ -4,10 +4,10 @@ use super::{Outcome, json_text, print};
 use crate::error::Error;
 use armcal_config::Pipeline;
 use armcal_core::Severity;
+use armcal_core::printable;
 use armcal_recording::{
     Extract, Extracted, Recording, RecordingError, RecordingReport, extract, files_of, input,
 };
-use armcal_report::printable;
 use armcal_stages::RunError;
 use clap::Args;
 use std::fmt::Write as _;

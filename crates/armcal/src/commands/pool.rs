@@ -6,7 +6,8 @@ use crate::progress::Progress;
 use crate::{pool, view};
 use armcal_config::Pipeline;
 use armcal_config::{InputMessages, OutputConfig};
-use armcal_report::{Detail, Status, pool_files, pool_json, terminal, write_all};
+use armcal_report::{Detail, pool_files, pool_json, terminal, write_all};
+use armcal_result::Status;
 use std::path::{Path, PathBuf};
 
 /// Pools results, writes all that one arm's run has to `out`, prints the story, or everything (or `pool.json`).

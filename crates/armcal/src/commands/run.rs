@@ -5,7 +5,8 @@ use crate::error::Error;
 use crate::progress::Progress;
 use crate::view;
 use armcal_config::Pipeline;
-use armcal_report::{Detail, Status, run_files, summary_json, terminal, write_all};
+use armcal_report::{Detail, run_files, summary_json, terminal, write_all};
+use armcal_result::Status;
 use std::path::{Path, PathBuf};
 
 /// Runs a pipeline, writes all results to `out`, prints the story, or everything (or the summary as JSON).

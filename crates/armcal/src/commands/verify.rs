@@ -6,7 +6,8 @@ use crate::progress::Progress;
 use crate::verify::verify;
 use armcal_config::Pipeline;
 use armcal_recording::{atomic, make_folder};
-use armcal_report::{Status, verification_files, verification_json, verification_paths, verification_text};
+use armcal_report::{verification_files, verification_json, verification_paths, verification_text};
+use armcal_result::Status;
 use std::path::Path;
 
 /// Verifies a result, prints the tables (or JSON), and writes files where a folder is given.

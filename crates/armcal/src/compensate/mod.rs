@@ -10,7 +10,7 @@ pub mod targets;
 use crate::error::Error;
 use armcal_compensate::{Target, TargetFrame};
 use armcal_core::{FeatureId, Unit};
-use armcal_report::{PastArms, PastModel};
+use armcal_result::{PastArms, PastModel};
 use nalgebra::{Point3, Vector3};
 use targets::Wanted;
 

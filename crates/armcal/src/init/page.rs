@@ -1,6 +1,6 @@
 //! A TOML file for people: every line with its reason.
 
-use armcal_report::printable;
+use armcal_core::printable;
 use std::fmt::Write as _;
 use std::path::Path;
 

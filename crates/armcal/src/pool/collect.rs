@@ -5,7 +5,7 @@ use armcal_config::ConfigError;
 use armcal_config::{BoardPose, ClosedChainSection, ClosureKind, FramePose, ObservationsSection, Pipeline};
 use armcal_core::{Against, Dwell, Observation, Pose, Severity, Stage, Warning};
 use armcal_recording::RecordingReport;
-use armcal_report::{
+use armcal_result::{
     BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, PastObservations,
     RecordingRun, StartFrame, also_in, sha256,
 };

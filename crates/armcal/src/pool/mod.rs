@@ -12,7 +12,7 @@ use armcal_calibrate::{FitConfig, HoldoutConfig, align_frames, calibrate};
 use armcal_config::{BoardPose, FramePose, Pipeline};
 use armcal_core::Pose;
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
-use armcal_report::{Run, Undiagnosed};
+use armcal_result::{Run, Undiagnosed};
 use armcal_stages::frames;
 use armcal_stages::joined_tips::place_bases;
 use std::path::PathBuf;

@@ -5,7 +5,7 @@ use super::judge::{AT_FLOOR, DWELLS};
 use super::table::{JUDGEMENTS, said};
 use super::{Judgement, Reliability, Row, Scored, nothing, rows};
 use armcal_lab::scenario;
-use armcal_report::VERSION;
+use armcal_result::VERSION;
 use std::fmt::Write as _;
 
 /// What was scored, and by which command.

@@ -13,7 +13,7 @@ use armcal_config::Pipeline;
 use armcal_core::{DwellId, Warning};
 use armcal_model::EffectSpec;
 use armcal_pipeline::Settled;
-use armcal_report::PastArms;
+use armcal_result::PastArms;
 use armcal_stages::{Fitted, with_effects};
 use armcal_stages::{frames, perceive};
 use rayon::prelude::*;

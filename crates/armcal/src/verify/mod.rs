@@ -23,7 +23,8 @@ use armcal_stages::measures::Measures;
 
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
-use armcal_report::{Closing, PastModel, PathSample, Verification, VerifiedRecording, open_model};
+use armcal_report::{PathSample, Verification, VerifiedRecording};
+use armcal_result::{Closing, PastModel, open_model};
 use armcal_stages::Seen;
 use armcal_stages::{frames, observe, perceive};
 use armcal_table::{Association, Board};

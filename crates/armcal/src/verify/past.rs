@@ -4,7 +4,7 @@ use crate::error::Error;
 use armcal_config::{FramePose, Pipeline, TipMount};
 use armcal_core::{Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
-use armcal_report::{PastArms, PastModel};
+use armcal_result::{PastArms, PastModel};
 use armcal_stages::Placed;
 use std::ops::Range;
 use std::path::Path;

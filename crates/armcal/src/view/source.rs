@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use armcal_recording::{atomic, input};
-use armcal_report::Conclusions;
+use armcal_result::Conclusions;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

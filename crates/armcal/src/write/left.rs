@@ -4,7 +4,7 @@ use super::Source;
 use crate::error::Error;
 use armcal_core::{DwellId, ErrorStats, FeatureId, Observation, Reference};
 use armcal_formats::zeros::JointZeros;
-use armcal_report::{OBSERVATIONS_FILE, PastModel, PastObservations};
+use armcal_result::{OBSERVATIONS_FILE, PastModel, PastObservations};
 use nalgebra::Vector3;
 use std::path::Path;
 

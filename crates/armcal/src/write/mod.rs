@@ -5,13 +5,14 @@
 pub mod left;
 
 use crate::error::Error;
+use armcal_core::printable;
 use armcal_core::{FeatureId, Pose, RollPitchYaw};
 use armcal_formats::dh::DhRows;
 use armcal_formats::ur::{UrKinematics, hash_in};
 use armcal_formats::zeros::JointZeros;
 use armcal_formats::{Format, FormatError, mjcf, sdf, urdf, xacro};
 use armcal_model::{Moving, Place, Skeleton};
-use armcal_report::{PastArms, PastModel, marked_xml, printable};
+use armcal_result::{PastArms, PastModel, marked_xml};
 use left::Recorded;
 use std::path::Path;
 

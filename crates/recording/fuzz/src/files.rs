@@ -8,7 +8,7 @@ use armcal::compensate::targets;
 use armcal_lab::LabConfig;
 use armcal_lab::pair::PairConfig;
 use armcal_model::{Chain, EffectSpec, EffectTable, Frames, Model, Session};
-use armcal_report::open_model;
+use armcal_result::open_model;
 use armcal_table::Board;
 use std::io::Write as _;
 use std::path::Path;

@@ -1,13 +1,13 @@
 //! The page of a campaign: errors over time, every change with its series, every recording.
 
 use super::Campaign;
+use super::story::campaign_story;
 use super::words::{self, meaning, repeated, sentence};
 use crate::ReportError;
 use crate::page::embed;
 use crate::page::shell::Shell;
-use crate::story::Story;
-use crate::told_warning::ToldWarning;
 use armcal_campaign::{Row, Series};
+use armcal_wording::ToldWarning;
 use askama::Template;
 use serde_json::{Value, json};
 
@@ -35,7 +35,7 @@ impl<'a> CampaignPage<'a> {
         let name = &campaign.pipeline;
         let names = (format!("{name}, campaign"), format!("{name} · every recording calibrated by itself"));
         let shell = Shell::new("campaign-page", names, &scripts, &document(campaign), "'none'")?;
-        let story = Story::of_campaign(campaign);
+        let story = campaign_story(campaign);
         let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
         Ok(CampaignPage {
             shell: shell.telling(&story),

@@ -1,10 +1,11 @@
 //! The row of one recording, taken from its run.
 
-use crate::run::Run;
 use armcal_calibrate::Estimate;
 use armcal_campaign::{ErrorFigures, Quantity, Row};
 use armcal_core::{ErrorStats, RollPitchYaw, Unit, Warning};
+use armcal_result::Run;
 use armcal_table::Tilt;
+use armcal_wording::answer;
 
 /// The row of a run on a single recording.
 ///
@@ -33,7 +34,7 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
         nominal: figures(&judged.nominal),
         calibrated: figures(&judged.fitted),
         noise_floor_m: calibration.noise_floor_m,
-        verdict: run.answer().sentence,
+        verdict: answer(run).sentence,
         missing: missing(run),
         warnings: warnings.iter().map(|w| run.in_words(&w.to_string())).collect(),
         severities: warnings.iter().map(|w| w.severity.word().to_owned()).collect(),

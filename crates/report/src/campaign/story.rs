@@ -2,28 +2,24 @@
 
 use super::Campaign;
 use super::words::{meaning, sentence};
-use crate::story::Story;
-use crate::text::printable;
-use crate::told_warning::ToldWarning;
 use armcal_campaign::{ErrorFigures, Row, Status};
 use armcal_core::units::millimetres;
-use armcal_core::{Severity, listed};
+use armcal_core::{Severity, listed, printable};
+use armcal_wording::{Story, ToldWarning};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
-impl Story {
-    /// Of a campaign.
-    pub fn of_campaign(campaign: &Campaign) -> Story {
-        let wrong = wrong(campaign);
-        let wrong = (!wrong.is_empty()).then(|| format!("{}.", wrong.join("; ")));
-        Story::undiagnosed(
-            conclusion(campaign),
-            wrong.into_iter().collect(),
-            campaign.status(),
-            next(campaign),
-            warnings(campaign),
-        )
-    }
+/// The end of a campaign.
+pub(super) fn campaign_story(campaign: &Campaign) -> Story {
+    let wrong = wrong(campaign);
+    let wrong = (!wrong.is_empty()).then(|| format!("{}.", wrong.join("; ")));
+    Story::undiagnosed(
+        conclusion(campaign),
+        wrong.into_iter().collect(),
+        campaign.status(),
+        next(campaign),
+        warnings(campaign),
+    )
 }
 
 /// What it comes to, in one sentence.

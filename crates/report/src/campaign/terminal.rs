@@ -1,13 +1,13 @@
 //! A campaign for people, at most 100 columns wide.
 
 use super::Campaign;
+use super::story::campaign_story;
 use super::words::{cells, meaning, repeated, sentence};
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::run::VERSION;
-use crate::story::Story;
 use crate::terminal::{Detail, Shown, ending};
-use crate::text::printable;
 use armcal_campaign::Row;
+use armcal_core::printable;
+use armcal_result::VERSION;
 use comfy_table::Cell;
 
 /// Recordings listed at most; all are in the page and in the table files.
@@ -42,7 +42,7 @@ pub fn campaign_text(campaign: &Campaign, style: TerminalStyle) -> String {
             .map(|f| ("failed", format!("{}: {}", printable(&f.recording), printable(&f.why))));
         sections.push(pen.section("Not calibrated", pen.list(failed)));
     }
-    sections.extend(ending(&pen, &Story::of_campaign(campaign), Detail::Everything, Shown::USUAL));
+    sections.extend(ending(&pen, &campaign_story(campaign), Detail::Everything, Shown::USUAL));
     sections.join("\n")
 }
 

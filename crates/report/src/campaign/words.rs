@@ -2,10 +2,10 @@
 
 use super::date::minute;
 use super::{Campaign, Repeat};
-use crate::text::{in_display_unit, printable};
 use armcal_campaign::{Change, ChangeKind, ErrorFigures, Row, Status};
-use armcal_core::Unit;
 use armcal_core::units::millimetres;
+use armcal_core::{Unit, printable};
+use armcal_wording::in_display_unit;
 
 /// Days of a month, as rates are told.
 const MONTH_DAYS: f64 = 30.0;

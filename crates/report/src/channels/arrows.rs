@@ -3,9 +3,8 @@
 use super::scene::places_m;
 use super::shapes::{Rgba, arrow, entity, label, note};
 use super::{Messages, start_ns, timestamp};
-use crate::findings::round_factor;
-use crate::points::Point;
-use crate::run::Run;
+use armcal_result::analysis::round_factor;
+use armcal_result::{Point, Run};
 use foxglove::messages as fox;
 use nalgebra::Vector3;
 

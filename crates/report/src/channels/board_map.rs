@@ -7,11 +7,10 @@ use super::board_scale::Scale;
 use super::shapes::{Rgba, arrow, disc, entity, note, text};
 use super::{Messages, run_start_ns};
 use crate::findings::Findings;
-use crate::proto::BoardErrors;
-use crate::run::Run;
-use crate::text::printable;
-use armcal_core::Pose;
 use armcal_core::robust::percentile;
+use armcal_core::{Pose, printable};
+use armcal_result::Run;
+use armcal_result::proto::BoardErrors;
 use foxglove::messages as fox;
 use nalgebra::{Translation3, Vector2, Vector3};
 

@@ -3,8 +3,8 @@
 use super::arrows::POINTS;
 use super::board_grid::Grid;
 use crate::findings::Findings;
-use crate::run::Run;
 use armcal_core::units::millimetres;
+use armcal_result::Run;
 
 /// Height of text as a share of the line that it lies in, where it is not too wide.
 const TEXT_HEIGHT: f64 = 0.75;

@@ -1,15 +1,13 @@
 //! The facts as protobuf messages of `proto/armcal.proto`.
 
-use super::{Messages, count, run_start_ns, start_ns, to_sensor_ns, unsigned};
-use crate::points::Point;
-use crate::proto;
-use crate::recording_names::RecordingNames;
-use crate::run::{Run, VERSION, effects, role_word, status_word};
-use crate::text::{conclusion, estimate_shown, remark};
+use super::{Messages, run_start_ns, start_ns, to_sensor_ns, unsigned};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
 use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
+use armcal_result::proto::{count, parameter};
+use armcal_result::{Point, RecordingNames, Run, VERSION, effects, proto, status_word};
 use armcal_table::{Assignment, Place};
+use armcal_wording::{conclusion, estimate_shown, remark};
 use nalgebra::Vector3;
 
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
@@ -165,33 +163,6 @@ pub(super) fn parameters(fit: &Fit, time_ns: i64) -> proto::Parameters {
         timestamp: time(time_ns),
         parameters: fit.estimates.iter().map(parameter).collect(),
         undetermined: fit.undetermined.iter().map(|u| u.text.clone()).collect(),
-    }
-}
-
-/// One parameter.
-pub(crate) fn parameter(e: &Estimate) -> proto::Parameter {
-    let p = &e.parameter;
-    let shown = |si: f64| p.unit.to_display(si);
-    proto::Parameter {
-        name: p.name.clone(),
-        unit: p.unit.symbol().into(),
-        nominal: p.nominal,
-        value: e.value,
-        sigma: e.sigma,
-        ci95_low: e.ci95[0],
-        ci95_high: e.ci95[1],
-        lower: p.lower,
-        upper: p.upper,
-        display_unit: p.unit.display_symbol().into(),
-        display_nominal: shown(p.nominal),
-        display_value: shown(e.value),
-        display_change: shown(e.value - p.nominal),
-        display_ci95_half: shown((e.ci95[1] - e.ci95[0]) / 2.0),
-        free: p.free,
-        determined: e.determined,
-        at_bound: e.at_bound,
-        role: role_word(p.role).into(),
-        meaning: p.meaning.clone(),
     }
 }
 

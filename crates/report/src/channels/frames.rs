@@ -2,9 +2,9 @@
 
 use super::shapes::{quaternion, vector};
 use super::{Messages, WORLD, run_start_ns, timestamp};
-use crate::run::Run;
 use armcal_core::{Dwell, Pose};
 use armcal_model::{LinkFrame, Model};
+use armcal_result::Run;
 use foxglove::messages as fox;
 use std::collections::BTreeSet;
 

@@ -2,9 +2,9 @@
 
 use super::{Messages, run_end_ns, run_start_ns, start_ns, timestamp};
 use crate::findings::Findings;
-use crate::run::{Run, VERSION};
-use crate::text::conclusion;
 use armcal_core::{DwellId, Severity, Stage, Warning};
+use armcal_result::{Run, VERSION};
+use armcal_wording::conclusion;
 use foxglove::messages as fox;
 use foxglove::messages::log::Level;
 use std::collections::BTreeMap;

@@ -52,21 +52,17 @@ pub(crate) mod robots;
 mod scene;
 mod shapes;
 
-pub(crate) use facts::parameter;
 pub(crate) use findings::{curve_topic, implied_topic};
 pub(crate) use scene::places_m;
 
 use crate::findings::Findings;
-use crate::points::Point;
-use crate::run::{RecordingRun, Run};
 use armcal_core::Dwell;
 use armcal_dwell::ClockAlignment;
 use armcal_recording::RecordingReport;
+use armcal_result::{Point, RecordingRun, Run};
 use foxglove::messages::Timestamp;
 use foxglove::{Encode, Schema};
 
-/// Beginning of every topic, attachment name and metadata name of armcal's own.
-pub(crate) const PREFIX: &str = "/armcal/";
 /// The frame in which positions are measured.
 pub(crate) const WORLD: &str = "world";
 
@@ -170,7 +166,7 @@ impl Messages {
 
     /// Text as ROS 2 has it: a string in little-endian CDR (OMG DDS-XTypes 1.3, 7.4) behind its four bytes of header.
     fn put_text(&mut self, topic: &str, time_ns: i64, text: &str) {
-        let length = count(text.len() + 1).to_le_bytes();
+        let length = armcal_result::proto::count(text.len() + 1).to_le_bytes();
         let data = [&[0, 1, 0, 0], &length[..], text.as_bytes(), &[0]].concat();
         self.messages.push(ResultMessage {
             topic: topic.into(),
@@ -181,11 +177,6 @@ impl Messages {
             data,
         });
     }
-}
-
-/// Counts and indices as protobuf has them.
-pub(crate) fn count(n: usize) -> u32 {
-    u32::try_from(n).unwrap_or(u32::MAX)
 }
 
 /// MCAP has no time before 1970.

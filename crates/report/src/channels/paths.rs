@@ -2,9 +2,8 @@
 
 use super::shapes::{at, pose};
 use super::{Messages, WORLD, start_ns, timestamp, to_sensor_ns};
-use crate::points::Point;
-use crate::run::RecordingRun;
 use armcal_core::Pose;
+use armcal_result::{Point, RecordingRun};
 use foxglove::messages as fox;
 use nalgebra::Vector3;
 

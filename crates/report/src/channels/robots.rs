@@ -5,9 +5,9 @@
 use super::frames::{BOARD as BOARD_FRAME, Link, links};
 use super::shapes::Rgba;
 use super::{Messages, WORLD, run_start_ns, scene};
-use crate::run::Run;
 use armcal_core::Pose;
 use armcal_model::Model;
+use armcal_result::Run;
 use armcal_table::Board;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::fmt::Write as _;

@@ -3,10 +3,9 @@
 use super::arrows::{Drawing, all};
 use super::shapes::{Rgba, disc, entity, line_strip, note, plate, sphere, text};
 use super::{Messages, start_ns};
-use crate::points::{Point, extent};
-use crate::run::Run;
 use armcal_core::{Dwell, Pose};
 use armcal_model::Model;
+use armcal_result::{Point, Run, extent};
 use armcal_table::Cavity;
 use foxglove::messages as fox;
 use nalgebra::{Translation3, Vector3};

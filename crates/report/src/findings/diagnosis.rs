@@ -1,14 +1,13 @@
 //! The verdict and what it was weighed against, in rows that a table panel shows.
 
-use super::{error_curve, finite, or_zero, short, shown_unlisted, steps};
-use crate::diagnosis_text::{channel_told, driver_told, headline};
-use crate::explanations::explanations;
-use crate::proto;
-use crate::run::{Answer, Run};
-use crate::sizes::{size_in_table, sizes, sizes_of};
-use crate::text::printable;
 use crate::viewer_text::for_viewer;
+use armcal_core::printable;
 use armcal_diagnose::{CandidateReport, Diagnosis, FoundEffect, UnknownReport};
+use armcal_result::analysis::{effects_label, error_curve, finite, or_zero, short};
+use armcal_result::{Run, proto};
+use armcal_wording::{
+    Answer, channel_told, driver_told, explanations, headline, shown_unlisted, size_in_table, sizes, sizes_of,
+};
 
 pub(super) fn diagnosis(run: &Run, d: &Diagnosis) -> proto::Diagnosis {
     let names = run.recording_names();
@@ -126,7 +125,7 @@ fn unlisted(run: &Run, u: &UnknownReport) -> proto::EffectRow {
         size: format!("up to {} {}", short(most), curve.unit).trim_end().to_owned(),
         name: u
             .effect()
-            .map_or_else(String::new, |effect| steps::told(&run.recording_names(), &[effect.to_string()])),
+            .map_or_else(String::new, |effect| effects_label(&run.recording_names(), &[effect.to_string()])),
     }
 }
 

@@ -4,10 +4,11 @@ use super::panels::{BLUE, GREY, VERMILION, dots};
 use super::scale::range;
 use super::spec::{Colour, Content, Direction, Plot};
 use crate::channels::implied_topic;
-use crate::findings::{Findings, moves_tip};
-use crate::proto::JointErrors;
-use crate::text::printable;
+use crate::findings::Findings;
+use armcal_core::printable;
 use armcal_core::robust::percentile;
+use armcal_result::analysis::moves_tip;
+use armcal_result::proto::JointErrors;
 
 /// A joint on which the effects found act by less than this share of the largest is not drawn again.
 const MOVED: f64 = 0.3;

@@ -15,8 +15,7 @@ mod tabs;
 mod views;
 
 use crate::findings::Findings;
-use crate::points::Point;
-use crate::run::Run;
+use armcal_result::{Point, Run};
 
 /// The two files of a layout.
 pub(crate) struct Layouts {

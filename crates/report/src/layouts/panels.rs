@@ -2,10 +2,10 @@
 
 use super::spec::{Colour, Content, Kind, Plot, Series};
 use crate::channels::curve_topic;
-use crate::diagnosis_text::{channel_told, driver_told};
 use crate::findings::Findings;
-use crate::proto::ErrorCurve;
-use crate::text::printable;
+use armcal_core::printable;
+use armcal_result::proto::ErrorCurve;
+use armcal_wording::{channel_told, driver_told};
 
 // Okabe and Ito's palette, which colour-blind people can tell apart.
 pub(super) const BLUE: Colour = Colour { hex: "#0072B2", name: "blue" };

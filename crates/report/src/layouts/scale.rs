@@ -2,8 +2,8 @@
 
 use super::joints::{What, drawn};
 use crate::findings::Findings;
-use crate::proto::JointErrors;
 use armcal_core::robust::{median, percentile};
+use armcal_result::proto::JointErrors;
 
 /// A joint whose errors are told so many times less sharply than those of the sharpest has a scale of its own.
 const BLUNT: f64 = 2.5;

@@ -7,10 +7,9 @@ use super::panels::{
 use super::spec::{Content, Direction, Kind};
 use super::views::{map, world};
 use crate::findings::Findings;
-use crate::points::Point;
-use crate::run::Run;
 use Direction::{Column, Row};
 use armcal_calibrate::Calibration;
+use armcal_result::{Point, Run};
 
 /// Joints of which angle and torque fit side by side in one tab; with more, each has a tab of its own.
 const FEW: usize = 3;

@@ -3,8 +3,7 @@
 use super::spec::View;
 use crate::channels::{board_grid, board_map, cloud, places_m, robots};
 use crate::findings::Findings;
-use crate::points::{Point, extent};
-use crate::run::Run;
+use armcal_result::{Point, Run, extent};
 use nalgebra::{Matrix3, Vector3};
 
 /// Width of the panel of the arm over its height where a sidebar is open on a laptop; a wider one shows more at the sides.

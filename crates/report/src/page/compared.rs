@@ -3,9 +3,8 @@
 use super::embed;
 use super::shell::Shell;
 use crate::ReportError;
-use crate::comparison::{Comparison, Difference};
-use crate::pairing::paired;
-use crate::past_run::PastRun;
+use crate::comparison::{comparison_sentence, difference_shown, moved_shown};
+use armcal_result::{Comparison, Difference, PastRun, paired};
 use askama::Template;
 use serde_json::{Value, json};
 
@@ -28,7 +27,7 @@ pub fn comparison_html(
     let scripts = [embed::TEXT, embed::CHART, include_str!("assets/compared.js")];
     let document = document(before, after, comparison);
     let shell = Shell::new("comparison-page", (title, kicker), &scripts, &document, "'none'")?;
-    Ok(ComparePage { shell: shell.saying(comparison.sentence()), comparison }.render()?)
+    Ok(ComparePage { shell: shell.saying(comparison_sentence(comparison)), comparison }.render()?)
 }
 
 #[derive(Template)]

@@ -1,17 +1,13 @@
 //! The one JSON document of the page: everything its scripts draw, worked out already.
 
-use super::basis::{Basis, Driver};
-use super::levers::Channel;
-use super::numbers::Column;
 use super::shown::{Shown, drawn_drivers, effect_names};
-use crate::diagnosis_text::{channel_told, driver_told};
 use crate::findings::unlisted_curves;
-use crate::proto::ErrorCurve;
-use crate::recording_names::RecordingNames;
-use crate::run::{Refit, Run};
-use crate::sizes::sizes;
 use armcal_diagnose::{CandidateReport, Diagnosis};
 use armcal_model::find;
+use armcal_result::levers::{Basis, Channel, Driver};
+use armcal_result::proto::ErrorCurve;
+use armcal_result::{Column, RecordingNames, Refit, Run};
+use armcal_wording::{channel_told, driver_told, sizes};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

@@ -9,37 +9,27 @@
 //! * `shell`: what all pages have in common; `compared`: that of
 //!   `armcal compare`.
 
-mod bands;
-mod basis;
 mod compared;
 mod document;
 pub(crate) mod embed;
-mod groups;
-mod levers;
-mod numbers;
 mod quality;
 pub(crate) mod shell;
 mod shown;
-mod signature;
 
-pub use basis::Basis;
 pub use compared::comparison_html;
-pub(crate) use numbers::Column;
 
 use crate::ReportError;
-use crate::by_marker::{MarkerErrors, by_marker};
-use crate::diagnosis_text::{WITH_CURVES, kind_of, pasted, unlisted};
-use crate::explanations::{Explanation, explanations, nested_sentence};
-use crate::findings::shown_unlisted;
-use crate::run::{Refit, Run};
-use crate::sizes::sizes_of;
-use crate::story::Story;
-use crate::told_warning::ToldWarning;
-use crate::two_arms::about;
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
 use armcal_core::units::millimetres;
 use armcal_diagnose::{FoundEffect, NotTestable};
+use armcal_result::by_marker::{MarkerErrors, by_marker};
+use armcal_result::levers::Basis;
+use armcal_result::{Refit, Run};
+use armcal_wording::{
+    Explanation, Story, ToldWarning, WITH_CURVES, about, explanations, kind_of, nested_sentence, pasted,
+    shown_unlisted, sizes_of, unlisted,
+};
 use askama::Template;
 use document::Document;
 use shell::Shell;

@@ -1,9 +1,8 @@
 //! What the page's tables say about the data themselves.
 
-use crate::past_observations::ObservedFile;
-use crate::run::{RecordingErrors, RecordingRun, Run};
 use armcal_core::units::millimetres;
 use armcal_recording::StreamReport;
+use armcal_result::{ObservedFile, RecordingErrors, RecordingRun, Run};
 
 /// One recording.
 pub(crate) struct RecordingRow<'a> {

@@ -2,8 +2,8 @@
 
 use super::embed;
 use crate::ReportError;
-use crate::run::{Status, VERSION};
-use crate::story::Story;
+use armcal_result::{Status, VERSION};
+use armcal_wording::Story;
 use serde::Serialize;
 
 /// Longer headlines than this are set smaller, so that what to do next stays on the first screen.

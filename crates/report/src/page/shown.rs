@@ -1,17 +1,12 @@
 //! One calibration as the page shows it: the run's own, a candidate's, or one asked for live.
 
-use super::bands::{Band, bands, drivers_of};
-use super::basis::Basis;
-use super::groups::{Group, groups};
-use super::numbers::Column;
-use super::signature::{Signature, signatures};
-use crate::pool_story;
-use crate::run::{Refit, Run, role_word};
-use crate::text::{conclusion, estimate_shown};
 use armcal_calibrate::{Calibration, Estimate, PairedDifference, SideErrors};
 use armcal_core::ErrorStats;
 use armcal_core::units::millimetres;
 use armcal_model::Model;
+use armcal_result::levers::{Band, Basis, Group, Signature, bands, drivers_of, groups, signatures};
+use armcal_result::{Column, Refit, Run, role_word};
+use armcal_wording::{conclusion, estimate_shown, pool_story};
 use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -3,8 +3,8 @@
 use super::page::verification_html;
 use super::{PathSample, Verification};
 use crate::ReportError;
-use crate::run::VERSION;
 use crate::tables::Columns;
+use armcal_result::VERSION;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use super::IsoReport;
 use crate::pen::{Pen, number};
-use crate::text::printable;
+use armcal_core::printable;
 use armcal_iso9283::{Criterion, NotMeasured};
 use comfy_table::Cell;
 

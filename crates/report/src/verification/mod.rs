@@ -9,12 +9,11 @@ mod terminal;
 pub use files::{verification_files, verification_json, verification_paths};
 pub use terminal::verification_text;
 
-use crate::run::{Status, status_of};
-use crate::two_arms::Closing;
 use armcal_config::Published;
 use armcal_core::Warning;
 use armcal_iso9283::Assessment;
 use armcal_model_file::Value;
+use armcal_result::{Closing, Status, status_of};
 use armcal_verify::{PathError, PathRow, PointsRow};
 use nalgebra::Vector3;
 use serde::Serialize;

@@ -3,11 +3,10 @@
 use super::row::{Row, or_dash};
 use super::{Told, Verification, VerifiedRecording};
 use crate::pen::{Pen, TerminalStyle, number};
-use crate::run::VERSION;
-use crate::text::printable;
-use crate::two_arms::Closing;
 use armcal_config::{On, Published};
+use armcal_core::printable;
 use armcal_core::units::millimetres;
+use armcal_result::{Closing, VERSION};
 use armcal_verify::{Against, By, Compared, PathRow, Plane};
 use comfy_table::Cell;
 

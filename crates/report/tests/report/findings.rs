@@ -2,7 +2,7 @@ use crate::recording::{Full, get, list, number, own, read, string, vector, write
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_config::InputMessages;
 use armcal_model::EffectSpec;
-use armcal_report::Refit;
+use armcal_result::Refit;
 use nalgebra::{Rotation3, Vector3};
 use prost_reflect::DynamicMessage;
 use serde_json::Value;

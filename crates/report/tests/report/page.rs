@@ -2,7 +2,9 @@
 
 use crate::synthetic::{HOSTILE, synthetic};
 use armcal_core::DwellId;
-use armcal_report::{Basis, PageKind, Refit, report_html, summary_json};
+use armcal_report::{PageKind, report_html, summary_json};
+use armcal_result::Refit;
+use armcal_result::levers::Basis;
 use serde_json::Value;
 
 const DATA: &str = "<script type=\"application/json\" id=\"data\">";

@@ -1,7 +1,8 @@
 use crate::synthetic::synthetic;
 use armcal_config::OutputConfig;
 use armcal_model::{EffectTable, Model};
-use armcal_report::{Run, open_model, write_all};
+use armcal_report::write_all;
+use armcal_result::{Run, open_model};
 use std::path::Path;
 
 /// What the model of a run predicts, in millimetres, at parameters that are off in every entry.

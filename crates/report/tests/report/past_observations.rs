@@ -1,9 +1,8 @@
 use crate::synthetic::synthetic;
 use armcal_config::OutputConfig;
 use armcal_core::{Observation, Reference};
-use armcal_report::{
-    BoardFacts, OBSERVATIONS_FILE, PastObservations, observations_json, open_model, write_all,
-};
+use armcal_report::write_all;
+use armcal_result::{BoardFacts, OBSERVATIONS_FILE, PastObservations, observations_json, open_model};
 
 #[test]
 fn what_a_fit_saw_comes_back_to_the_last_bit() {

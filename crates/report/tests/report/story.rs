@@ -5,7 +5,9 @@ use crate::recording::{get, own, read, string, write};
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_config::InputMessages;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{Basis, Detail, PageKind, Status, TerminalStyle, report_html, summary_json, terminal};
+use armcal_report::{Detail, PageKind, TerminalStyle, report_html, summary_json, terminal};
+use armcal_result::Status;
+use armcal_result::levers::Basis;
 
 /// Text without line breaks, indents and markup of characters.
 fn flat(text: &str) -> String {
@@ -57,7 +59,7 @@ fn said(s: &Synthetic, folder: &str) -> (String, Vec<String>) {
 fn page_layout_and_terminal_say_the_same() {
     let plain = synthetic();
     let (lamp, lines) = said(&plain, "plain");
-    assert_eq!(lines[0], plain.run.answer().sentence);
+    assert_eq!(lines[0], armcal_wording::answer(&plain.run).sentence);
     assert!(lines[2].starts_with("Status: "));
     if plain.run.status() != Status::Ok {
         assert!(["inadequate", "data_lost", "unexplained", "setup"].contains(&lamp.as_str()), "{lamp}");

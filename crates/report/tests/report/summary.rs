@@ -132,7 +132,7 @@ fn the_status_is_that_of_the_gravest_warning() {
     assert_eq!(status(&s.run), "data_lost");
 }
 
-fn status(run: &armcal_report::Run) -> String {
+fn status(run: &armcal_result::Run) -> String {
     let summary: serde_json::Value = serde_json::from_str(&summary_json(run).unwrap()).unwrap();
     summary["status"].as_str().unwrap().to_owned()
 }

@@ -10,7 +10,7 @@ use armcal_core::{
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Chain, Frame, Frames, Model, Session};
 use armcal_recording::Recording;
-use armcal_report::{RecordingRun, Run, Undiagnosed};
+use armcal_result::{RecordingRun, Run, Undiagnosed};
 use armcal_table::{Assignment, Association, Board, Place};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};

@@ -1,6 +1,7 @@
 use crate::synthetic::{HOSTILE, synthetic};
 use armcal_core::Severity;
-use armcal_report::{Detail, TerminalStyle, conclusion, terminal};
+use armcal_report::{Detail, TerminalStyle, terminal};
+use armcal_wording::conclusion;
 
 #[test]
 fn what_a_person_reads() {
@@ -16,7 +17,7 @@ fn what_decides_fits_on_a_screen_and_ends_with_verdict_status_and_next_step() {
     assert!(story.lines().count() < 38, "{story}");
     let at = |text: &str, what: &str| text.find(what).unwrap_or_else(|| panic!("no {what:?} in {text}"));
     for text in [&story, &everything] {
-        let answer = s.run.answer().sentence;
+        let answer = armcal_wording::answer(&s.run).sentence;
         let verdict = at(text, answer.split(' ').take(3).collect::<Vec<_>>().join(" ").as_str());
         assert!(at(text, "mean error falls") < verdict && verdict < at(text, "Status: "));
     }

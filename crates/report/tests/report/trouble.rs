@@ -40,7 +40,7 @@ fn one_file_that_cannot_be_written_leaves_no_other() {
 #[test]
 fn a_run_that_contradicts_itself_is_refused() {
     let s = synthetic();
-    let refused = |change: &dyn Fn(&mut armcal_report::Run)| {
+    let refused = |change: &dyn Fn(&mut armcal_result::Run)| {
         let mut run = s.run.clone();
         change(&mut run);
         let out = s.folder.path().join("never");

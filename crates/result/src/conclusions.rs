@@ -1,0 +1,111 @@
+//! `armcal/conclusions.toml` in `run.mcap`: what took a run longer than its fit, so that whoever opens its results does not
+//! search again. TOML, because a number may be infinite.
+
+use crate::called::Called;
+use crate::error::ResultError;
+use crate::past::{PastRunError, attachment, run_file};
+use crate::run::{Run, VERSION};
+use armcal_calibrate::Calibration;
+use armcal_core::{Observation, SetupReport};
+use armcal_diagnose::{Calibrated, Diagnosis};
+use armcal_table::Board;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
+use std::path::Path;
+
+/// Name of the attachment.
+pub const FILE: &str = "conclusions.toml";
+/// Format of the text.
+const SCHEMA: &str = "armcal.conclusions/1";
+
+/// What a run concluded from its calibration.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Conclusions {
+    schema: String,
+    /// Hash of the [`Grounds`].
+    grounds: String,
+    /// How the run calls things.
+    pub called: Called,
+    /// What contradicts the data about the setup.
+    pub setup: SetupReport,
+    /// What is missing in the model.
+    pub diagnosis: Diagnosis,
+}
+
+/// What conclusions are drawn from.
+#[derive(Debug, Clone, Copy)]
+pub struct Grounds<'a> {
+    /// Text of the pipeline.
+    pub pipeline_text: &'a str,
+    /// Texts of the nominal arms.
+    pub model_texts: &'a [String],
+    /// The board.
+    pub board: Option<&'a Board>,
+    /// What was observed.
+    pub observations: &'a [Observation],
+    /// The calibration on it.
+    pub calibration: &'a Calibration,
+}
+
+impl Grounds<'_> {
+    /// Hash of all of it, every number in full: what differs in the last digit is another calibration.
+    fn hash(&self) -> String {
+        let Grounds { pipeline_text, model_texts, board, observations, calibration } = self;
+        let models = model_texts.iter().cloned();
+        let numbers =
+            format!("{board:?} {observations:?} {:?}", (calibration.fit.values(), &calibration.residuals));
+        let mut hasher = Sha256::new();
+        for part in [VERSION.to_owned(), (*pipeline_text).to_owned(), numbers].into_iter().chain(models) {
+            hasher.update((part.len() as u64).to_le_bytes());
+            hasher.update(part);
+        }
+        hex::encode(hasher.finalize())
+    }
+}
+
+impl Conclusions {
+    /// Those of a run; none of one that was not diagnosed.
+    pub fn of(run: &Run) -> Option<Conclusions> {
+        let Run { pipeline_text, model_texts, board, observations, calibration, .. } = run;
+        let grounds =
+            Grounds { pipeline_text, model_texts, board: board.as_ref(), observations, calibration };
+        let diagnosis = run.diagnosis.clone()?;
+        Some(Conclusions {
+            schema: SCHEMA.to_owned(),
+            grounds: grounds.hash(),
+            called: run.called(),
+            setup: run.setup.clone(),
+            diagnosis,
+        })
+    }
+
+    /// Those in the results of a run (`run.mcap`, or its folder); none where it has none, or those of another version.
+    ///
+    /// # Errors
+    /// Results that cannot be read.
+    pub fn open(path: &Path) -> Result<Option<Conclusions>, PastRunError> {
+        let text = attachment(&run_file(path), FILE)?;
+        let read = text.and_then(|text| toml::from_str::<Conclusions>(&text).ok());
+        Ok(read.filter(|own| own.schema == SCHEMA))
+    }
+
+    /// As text.
+    pub fn text(&self) -> Result<String, ResultError> {
+        toml::to_string(self).map_err(|e| ResultError::Inconsistent(format!("{FILE}: {e}")))
+    }
+
+    /// The diagnosis, what it found fitted again.
+    pub fn diagnosis_of(&self, calibrated: &Calibrated<'_>) -> Diagnosis {
+        let mut diagnosis = self.diagnosis.clone();
+        diagnosis.refitted = None;
+        if self.called.is_refitted {
+            diagnosis.refit(calibrated);
+        }
+        diagnosis
+    }
+
+    /// Whether they were drawn from these.
+    pub fn are_of(&self, grounds: &Grounds<'_>) -> bool {
+        self.grounds == grounds.hash()
+    }
+}

@@ -1,0 +1,13 @@
+//! What each residual says about the places where an error may enter, and the shape of an effect by itself.
+
+mod bands;
+mod basis;
+mod groups;
+mod lever;
+mod signature;
+
+pub use bands::{Band, bands, drivers_of};
+pub use basis::{Basis, Driver};
+pub use groups::{Group, groups};
+pub use lever::{Channel, Levers};
+pub use signature::{Signature, signatures};
