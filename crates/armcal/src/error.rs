@@ -1,5 +1,6 @@
 //! Everything that stops a command, in words that say what was being done and to what.
 
+use armcal_init::InitError;
 use armcal_stages::RunError;
 use std::path::PathBuf;
 
@@ -11,14 +12,11 @@ pub enum Error {
     #[error(transparent)]
     Run(#[from] RunError),
     /// No pipeline can be proposed.
-    #[error("{problem}")]
-    Init { problem: String },
+    #[error(transparent)]
+    Init(#[from] InitError),
     /// A name on the command line that means nothing.
     #[error(transparent)]
     Usage(Box<Error>),
-    /// What a batch should work on.
-    #[error("recordings `{what}`: {why}")]
-    Manifest { what: String, why: String },
     /// A file in a campaign's folder that is not what it should be.
     #[error("campaign {}: {why}", path.display())]
     Campaign { path: PathBuf, why: String },
@@ -129,17 +127,8 @@ pub enum Error {
     Stdout(std::io::Error),
 }
 
-/// What may stop a run stops a command.
-macro_rules! of_run {
-    ($($source:ty),*) => {$(
-        impl From<$source> for Error {
-            fn from(source: $source) -> Error {
-                Error::Run(source.into())
-            }
-        }
-    )*};
-}
-of_run!(
+armcal_stages::stopped_as_run!(
+    Error:
     armcal_config::ConfigError,
     armcal_table::TableError,
     armcal_model::ModelError,
@@ -166,6 +155,7 @@ impl Error {
         match self {
             Error::NoLimits { .. }
             | Error::Usage(_)
+            | Error::Init(InitError::Usage { .. })
             | Error::BadOption { .. }
             | Error::Shard(_)
             | Error::NoPipeline => 2,

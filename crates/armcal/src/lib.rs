@@ -12,7 +12,6 @@ pub mod compensate;
 pub mod dispatch;
 pub mod error;
 pub mod extended;
-pub mod init;
 pub mod plan;
 pub mod pool;
 pub mod progress;

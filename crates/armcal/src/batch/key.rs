@@ -1,9 +1,8 @@
 //! What a result is made from: the files, what is declared about them, the pipeline, the version.
 
-use super::Manifest;
 use crate::error::Error;
 use armcal_config::ConfigError;
-use armcal_config::{Pipeline, RecordingEntry};
+use armcal_config::{Manifest, Pipeline, RecordingEntry};
 use armcal_recording::{atomic, identity_of, input, make_folder_in, read_with};
 use armcal_report::VERSION;
 use armcal_stages::RunError;

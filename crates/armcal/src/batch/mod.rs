@@ -7,21 +7,18 @@
 //! batch is one share and its reduction, so all three ways give the same bytes.
 
 mod key;
-mod manifest;
 mod memory;
 mod once;
-mod pattern;
 mod shard;
 mod store;
 mod work;
 mod workers;
 
-pub use manifest::{Manifest, recordings_below};
 pub use shard::Shard;
 
 use crate::error::Error;
 use crate::progress::Progress;
-use armcal_config::Pipeline;
+use armcal_config::{Manifest, Pipeline};
 use armcal_report::{Campaign, FailedRecording, write_campaign};
 use key::Keys;
 use shard::{Done, Receipt};

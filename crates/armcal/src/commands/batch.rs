@@ -1,10 +1,10 @@
 //! `armcal batch`, `armcal map`, `armcal reduce`: a whole archive, on one machine or many.
 
 use super::{Outcome, may_write, print, style};
-use crate::batch::{self, Manifest, Request, Shard, receipt_file};
+use crate::batch::{self, Request, Shard, receipt_file};
 use crate::error::Error;
 use crate::progress::Progress;
-use armcal_config::Pipeline;
+use armcal_config::{Manifest, Pipeline};
 use armcal_recording::input;
 use armcal_report::{Campaign, Status, campaign_files, campaign_json, campaign_text};
 use std::path::{Path, PathBuf};

@@ -12,7 +12,7 @@ use super::roles::{Cast, Role};
 use super::seats::Seats;
 use super::sockets::Sockets;
 use super::{Asked, Tried};
-use crate::error::Error;
+use crate::error::InitError;
 use armcal_config::Pipeline;
 use armcal_recording::{atomic, sealed};
 use armcal_table::Board;
@@ -48,11 +48,11 @@ impl Proposal {
     }
 
     /// The same pipeline with the unwritten files in another folder.
-    pub fn in_folder(&self, folder: &Path) -> Result<Pipeline, Error> {
+    pub fn in_folder(&self, folder: &Path) -> Result<Pipeline, InitError> {
         let mut pipeline = self.pipeline.clone();
         for (path, text) in &self.beside {
             let copy = folder.join(path.file_name().unwrap_or_default());
-            atomic::write(&copy, text.as_bytes()).map_err(Error::Output)?;
+            atomic::write(&copy, text.as_bytes()).map_err(InitError::Output)?;
             if path.extension().is_some_and(|e| e == "urdf") {
                 pipeline.model.urdf = Some(copy);
             } else if let Some(table) = &mut pipeline.table {
@@ -91,7 +91,7 @@ pub struct Known<'a> {
 
 impl Known<'_> {
     /// The proposal, parsed by the very reader of pipelines.
-    pub fn propose(&self, mut left: Vec<(String, String)>) -> Result<Proposal, Error> {
+    pub fn propose(&self, mut left: Vec<(String, String)>) -> Result<Proposal, InitError> {
         let folder = self.asked.out.parent().unwrap_or(Path::new("")).to_owned();
         let (beside, unsure, unseen) = (Vec::new(), self.arm.unsure.clone(), Vec::new());
         let mut draft = Draft { known: self, page: Page::default(), folder, beside, unsure, unseen };

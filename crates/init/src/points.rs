@@ -1,6 +1,6 @@
 //! What a laser tracker exported beside the recordings, as the `points` of a pipeline: what its header says, and what it does not.
 
-use crate::error::Error;
+use crate::error::InitError;
 use armcal_config::read_text;
 use armcal_recording::LengthUnit;
 use armcal_recording::input::Kind;
@@ -25,9 +25,9 @@ pub struct Points {
 }
 
 /// Looks into a file.
-pub fn look(path: &Path) -> Result<Points, Error> {
+pub fn look(path: &Path) -> Result<Points, InitError> {
     let text = read_text("CSV of points", Kind::Data, path)?;
-    let bad = |problem: String| Error::Init { problem: format!("{}: {problem}", path.display()) };
+    let bad = |problem: String| InitError::Init { problem: format!("{}: {problem}", path.display()) };
     let table = parse(&text, 1.0, None).map_err(bad)?;
     let unit = unit(&table.header).map_err(bad)?;
     let (mut time, mut unread) = (None, Vec::new());

@@ -4,7 +4,7 @@ use super::arm::Arm;
 use super::channels::{BodyTopic, Channels, JointTopic};
 use super::files::Opened;
 use super::frames;
-use crate::error::Error;
+use crate::error::InitError;
 use armcal_core::{Dwell, PoseSamples, Samples};
 use armcal_dwell::{DwellConfig, detect_dwells};
 use armcal_recording::{
@@ -57,7 +57,7 @@ pub fn key(body: usize) -> String {
 }
 
 /// Reads all that may be used.
-pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead, Error> {
+pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead, InitError> {
     let mut left = Vec::new();
     let mut bodies: Vec<BodyTopic> = Vec::new();
     for body in &channels.bodies {
@@ -100,7 +100,7 @@ pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead
         ..Streams::default()
     };
     left.extend(channels.temperatures.iter().skip(1).map(|t| (t.clone(), "another thermometer".to_owned())));
-    let mut all = |streams: &mut Streams| -> Result<Vec<Read>, Error> {
+    let mut all = |streams: &mut Streams| -> Result<Vec<Read>, InitError> {
         opened.iter().map(|one| read_one(one, streams, &mut left)).collect()
     };
     let first = streams.clone();
@@ -112,7 +112,11 @@ pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead
     Ok(AllRead { streams, bodies, recordings, left })
 }
 
-fn read_one(one: &Opened, streams: &mut Streams, left: &mut Vec<(String, String)>) -> Result<Read, Error> {
+fn read_one(
+    one: &Opened,
+    streams: &mut Streams,
+    left: &mut Vec<(String, String)>,
+) -> Result<Read, InitError> {
     let name = one.entry.name();
     loop {
         match one.recording.read(streams) {

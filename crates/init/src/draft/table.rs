@@ -1,9 +1,9 @@
 //! The table, and the hold-out that fits it.
 
 use super::Draft;
-use crate::init::page::{Page, list, number, quoted, relative};
-use crate::init::roles::Role;
-use crate::init::sockets::Sockets;
+use crate::page::{Page, list, number, quoted, relative};
+use crate::roles::Role;
+use crate::sockets::Sockets;
 
 /// More cavities than this are a board rather than a few sockets.
 const FEW_SOCKETS: usize = 9;

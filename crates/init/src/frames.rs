@@ -2,7 +2,7 @@
 
 use super::channels::BodyTopic;
 use super::files::Opened;
-use crate::error::Error;
+use crate::error::InitError;
 use armcal_recording::{LengthUnit, Transforms};
 use armcal_stages::RunError;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +13,7 @@ pub fn join(
     bodies: &mut Vec<BodyTopic>,
     opened: &[Opened],
     left: &mut Vec<(String, String)>,
-) -> Result<(), Error> {
+) -> Result<(), InitError> {
     let Some(first) = opened.first() else { return Ok(()) };
     let named: BTreeSet<String> =
         bodies.iter().filter(|b| b.position.is_none()).map(|b| b.topic.clone()).collect();

@@ -2,7 +2,7 @@
 
 use super::channels::{Channels, JointTopic};
 use super::fields::Field;
-use crate::error::Error;
+use crate::error::InitError;
 use armcal_core::Pose;
 use armcal_model::{Chain, Model, check_xml};
 use armcal_recording::input::Kind;
@@ -63,14 +63,14 @@ impl Arm {
     }
 
     /// The same arm with the tip at another link.
-    pub fn model_to(&self, tip: &str) -> Result<Model, Error> {
+    pub fn model_to(&self, tip: &str) -> Result<Model, InitError> {
         let base = self.base_link.as_deref().unwrap_or_default();
         Ok(bare(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())?)
     }
 
     /// The links that the tip may be, of a URDF, with their places on the first of them. They are fixed to each other, so all of
     /// them are read at once, and put where they are in any posture.
-    pub fn tip_places(&self) -> Result<Vec<(Option<String>, Pose)>, Error> {
+    pub fn tip_places(&self) -> Result<Vec<(Option<String>, Pose)>, InitError> {
         let Some((first, others)) = self.tips.split_first() else {
             return Ok(vec![(None, Pose::identity())]);
         };
@@ -102,7 +102,7 @@ pub fn find(
     channels: &Channels,
     folders: &BTreeSet<PathBuf>,
     beside: &Path,
-) -> Result<Arm, Error> {
+) -> Result<Arm, InitError> {
     if let Some(asked) = &told.joints
         && !channels.joints.iter().any(|j| is_called(j, asked))
     {
@@ -111,7 +111,7 @@ pub fn find(
             "--joints {asked} is no topic of joint readings in all recordings; there are: {}",
             present.join(", ")
         );
-        return Err(Error::of_usage(Error::Init { problem }));
+        return Err(InitError::Usage { problem });
     }
     let unnamed = |j: &JointTopic| {
         let field = j.field.clone().map(|f| Field { name: None, ..f });
@@ -164,7 +164,12 @@ fn urdfs_in(folders: &BTreeSet<PathBuf>) -> Vec<PathBuf> {
     found
 }
 
-fn found(told: &Told, channels: &Channels, folders: &BTreeSet<PathBuf>, beside: &Path) -> Result<Arm, Error> {
+fn found(
+    told: &Told,
+    channels: &Channels,
+    folders: &BTreeSet<PathBuf>,
+    beside: &Path,
+) -> Result<Arm, InitError> {
     if let Some(path) = &told.dh {
         return from_dh(told, channels, path);
     }
@@ -191,13 +196,13 @@ fn found(told: &Told, channels: &Channels, folders: &BTreeSet<PathBuf>, beside: 
     from_urdf(told, channels, file, text, recorded)
 }
 
-fn no_arm(channels: &Channels, why: &str) -> Error {
+fn no_arm(channels: &Channels, why: &str) -> InitError {
     let names = channels.joints.iter().map(|j| format!("{} ({})", j.shown(), said(j)));
     let problem = format!(
         "nothing says what the arm is: {why}; give --urdf FILE or --dh FILE (docs/guide.md shows one). Recorded joints: {}",
         names.collect::<Vec<_>>().join("; ")
     );
-    Error::Init { problem }
+    InitError::Init { problem }
 }
 
 /// The joints of a topic in words.
@@ -208,11 +213,11 @@ fn said(joints: &JointTopic) -> String {
     }
 }
 
-fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> {
+fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, InitError> {
     let text = armcal_config::read_text("DH model", Kind::Text, path)?;
     if text.trim_start().starts_with('<') {
         let problem = format!("{} is XML and no DH table: a URDF is given with --urdf", path.display());
-        return Err(Error::Init { problem });
+        return Err(InitError::Init { problem });
     }
     let chain = Chain::from_dh_toml(&text, path)?;
     let rows = chain.joint_names().to_vec();
@@ -249,7 +254,7 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, Error> 
     })
 }
 
-fn other_joints(channels: &Channels, model: &[String], path: &Path) -> Error {
+fn other_joints(channels: &Channels, model: &[String], path: &Path) -> InitError {
     let topics = channels.joints.iter().map(|j| format!("{} has {}", j.shown(), said(j)));
     let problem = format!(
         "no topic has the joints of {} ({}): {}",
@@ -257,7 +262,7 @@ fn other_joints(channels: &Channels, model: &[String], path: &Path) -> Error {
         model.join(", "),
         topics.collect::<Vec<_>>().join("; ")
     );
-    Error::Init { problem }
+    InitError::Init { problem }
 }
 
 /// The topics that may be meant.
@@ -300,8 +305,9 @@ fn from_urdf(
     file: PathBuf,
     text: String,
     recorded: bool,
-) -> Result<Arm, Error> {
-    let bad = |problem: String| Error::Init { problem: format!("{}: {problem}", file.display()) };
+) -> Result<Arm, InitError> {
+    let at = |problem: String| format!("{}: {problem}", file.display());
+    let bad = |problem: String| InitError::Init { problem: at(problem) };
     check_xml(&text).map_err(&bad)?;
     let document =
         Document::parse(&text).map_err(|e| bad(format!("is no XML: {e}; a DH table is given with --dh")))?;
@@ -320,8 +326,9 @@ fn from_urdf(
     let end = match &told.tip_link {
         Some(tip) => {
             let known = joints.get_key_value(tip.as_str()).map(|(link, _)| *link);
-            let known =
-                known.ok_or_else(|| Error::of_usage(bad(format!("--tip-link {tip} is no link of it"))))?;
+            let known = known.ok_or_else(|| InitError::Usage {
+                problem: at(format!("--tip-link {tip} is no link of it")),
+            })?;
             path(&joints, known).into_iter().rev().find(|link| counts(&joints[link]))
         }
         None => {

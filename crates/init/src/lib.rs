@@ -5,9 +5,12 @@
 //! What a body is follows from how it moves; what it is called decides nothing. Nothing is asked that can be seen, and what
 //! could not be seen is said.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod arm;
 mod channels;
 mod draft;
+mod error;
 mod evidence;
 mod fields;
 mod files;
@@ -23,16 +26,15 @@ mod sockets;
 
 pub use arm::Told;
 pub use channels::BodyTopic;
+pub use error::InitError;
 pub use proposal::Proposal;
 pub use roles::{Cast, Role};
 
-use crate::error::Error;
-use crate::progress::Progress;
 use armcal_calibrate::HoldoutConfig;
 use armcal_recording::input::Kind;
-use armcal_stages::Inputs;
 use armcal_stages::associated::Associated;
 use armcal_stages::perceive;
+use armcal_stages::{Inputs, Silent, Steps};
 use armcal_table::Board;
 use channels::Channels;
 use proposal::Known;
@@ -60,10 +62,10 @@ pub struct Asked {
 ///
 /// # Errors
 /// What is no recording, no arm, joints that are not recorded, an arm that never pauses, nothing that says where the tip was.
-pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
+pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitError> {
     progress.step("opening the recordings");
     let opened = files::open_all(&asked.inputs, &asked.out)?;
-    let points = asked.points.iter().map(|path| points::look(path)).collect::<Result<Vec<_>, Error>>()?;
+    let points = asked.points.iter().map(|path| points::look(path)).collect::<Result<Vec<_>, InitError>>()?;
     if !points.is_empty() && points.len() != opened.len() {
         let names: Vec<String> = opened.iter().map(|o| o.entry.name()).collect();
         let problem = format!(
@@ -72,7 +74,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
             opened.len(),
             names.join(", ")
         );
-        return Err(Error::Init { problem });
+        return Err(InitError::Init { problem });
     }
     let mut channels = channels::look(&opened)?;
     if !points.is_empty() {
@@ -95,7 +97,7 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
              second at the very least (docs/guide.md says how to record them)",
             arm.source.shown()
         );
-        return Err(Error::Init { problem });
+        return Err(InitError::Init { problem });
     }
     progress.step("comparing motions");
     let board = asked.board.as_deref().map(read_board).transpose()?;
@@ -134,15 +136,14 @@ pub fn propose(asked: &Asked, progress: &Progress) -> Result<Proposal, Error> {
     drop((read, opened));
     progress.step("trying the proposal");
     proposal.tried = Some(tried(&proposal));
-    progress.finish();
     Ok(proposal)
 }
 
-fn read_board(path: &Path) -> Result<Board, Error> {
+fn read_board(path: &Path) -> Result<Board, InitError> {
     Ok(Board::from_toml(&armcal_config::read_text("board", Kind::Text, path)?, path)?)
 }
 
-fn no_joints(channels: &Channels) -> Error {
+fn no_joints(channels: &Channels) -> InitError {
     let left = channels.left.iter().map(|(topic, why)| format!("{topic} ({why})"));
     let bodies = channels.bodies.iter().map(|b| format!("{} (a tracked body)", b.shown()));
     let warm = channels.temperatures.iter().map(|t| format!("{t} (a thermometer)"));
@@ -155,10 +156,10 @@ fn no_joints(channels: &Channels) -> Error {
             seen.join("; ")
         ),
     };
-    Error::Init { problem }
+    InitError::Init { problem }
 }
 
-fn nothing_seen(arm: &arm::Arm, read: &read::AllRead, cast: &[Cast]) -> Error {
+fn nothing_seen(arm: &arm::Arm, read: &read::AllRead, cast: &[Cast]) -> InitError {
     let bodies = read.bodies.iter().zip(cast).map(|(body, cast)| format!("{}: {}", body.shown(), cast.why));
     let bodies: Vec<String> = bodies.collect();
     let bodies = if bodies.is_empty() { "no body is tracked".to_owned() } else { bodies.join("; ") };
@@ -168,11 +169,11 @@ fn nothing_seen(arm: &arm::Arm, read: &read::AllRead, cast: &[Cast]) -> Error {
         "nothing says where the tip was: {bodies}{left}; and its pauses are not in a few places that it came back to in other \
          postures. Give --board FILE if it sat in cavities of a board (docs/guide.md shows one){unsure}"
     );
-    Error::Init { problem }
+    InitError::Init { problem }
 }
 
 /// Finds how large the fixture is, with the pipeline as it would be proposed.
-fn size_sockets(known: &mut Known<'_>) -> Result<(), Error> {
+fn size_sockets(known: &mut Known<'_>) -> Result<(), InitError> {
     let mut pipeline = known.propose(Vec::new())?.pipeline;
     pipeline.holdout = HoldoutConfig::None;
     let chain =
@@ -184,8 +185,8 @@ fn size_sockets(known: &mut Known<'_>) -> Result<(), Error> {
         Some(deviation) => chain.with_deviation(deviation, &known.arm.file)?,
         None => chain,
     };
-    let recordings = perceive::open_all(&pipeline, &Progress::silent())?;
-    let seen = perceive::dwells_of_all(&pipeline, &chain, &recordings, &Progress::silent(), &mut drop)?;
+    let recordings = perceive::open_all(&pipeline, &Silent)?;
+    let seen = perceive::dwells_of_all(&pipeline, &chain, &recordings, &Silent, &mut drop)?;
     if let Some(sockets) = &mut known.sockets {
         let board = Some(sockets.board.clone());
         let (changes, most_rounds, known) = (Vec::new(), 2, Associated::default());
@@ -207,11 +208,11 @@ pub struct Tried {
 
 /// Calibrates with a proposal whose files may not be written yet: they are put beside a copy of it.
 fn tried(proposal: &Proposal) -> Result<Tried, String> {
-    let attempt = || -> Result<Tried, Error> {
+    let attempt = || -> Result<Tried, InitError> {
         let folder =
-            tempfile::tempdir().map_err(|source| Error::Folder { path: std::env::temp_dir(), source })?;
+            tempfile::tempdir().map_err(|source| InitError::Folder { path: std::env::temp_dir(), source })?;
         let pipeline = proposal.in_folder(folder.path())?;
-        let settled = armcal_pipeline::settle(&pipeline, &Progress::silent())?;
+        let settled = armcal_pipeline::settle(&pipeline, &Silent)?;
         let judged = settled.fitted.calibration.judged();
         let mistakes = settled.setup.mistakes().map(|m| m.message.clone()).collect();
         Ok(Tried { points: judged.fitted.n, mean_m: [judged.nominal.mean_m, judged.fitted.mean_m], mistakes })

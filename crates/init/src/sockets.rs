@@ -5,7 +5,7 @@
 
 use super::arm::Arm;
 use super::read::{AllRead, Read};
-use crate::error::Error;
+use crate::error::InitError;
 use armcal_core::Pose;
 use armcal_core::robust::median;
 use armcal_stages::Inputs;
@@ -57,7 +57,7 @@ struct OnLink {
 }
 
 /// Finds the sockets of recordings in which nothing but the joints was seen.
-pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, Error> {
+pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, InitError> {
     let mut found: Vec<OnLink> = Vec::new();
     let p = arm.model.nominal();
     let in_pauses =

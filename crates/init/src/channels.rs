@@ -2,7 +2,7 @@
 
 use super::fields::{Field, Fields};
 use super::files::Opened;
-use crate::error::Error;
+use crate::error::InitError;
 use armcal_recording::decode::{Plan, Role, Rows, readable_as};
 use armcal_recording::{RawChannel, RawSchema, RecordingError, inflated};
 use armcal_stages::RunError;
@@ -92,7 +92,7 @@ struct Found {
 }
 
 /// Looks into every recording.
-pub fn look(opened: &[Opened]) -> Result<Channels, Error> {
+pub fn look(opened: &[Opened]) -> Result<Channels, InitError> {
     let mut found: BTreeMap<String, Found> = BTreeMap::new();
     let mut fields: BTreeMap<String, Fields> = BTreeMap::new();
     let mut channels = Channels::default();

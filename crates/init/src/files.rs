@@ -1,8 +1,7 @@
 //! Which files are one recording: bag folders, globs, the parts of a split bag.
 
-use crate::batch::{Manifest, recordings_below};
-use crate::error::Error;
-use armcal_config::{ConfigError, RecordingEntry};
+use crate::error::InitError;
+use armcal_config::{ConfigError, Manifest, RecordingEntry, recordings_below};
 use armcal_recording::{Recording, is_recording, is_url, without_ending};
 use armcal_stages::RunError;
 use std::io::Read as _;
@@ -21,10 +20,10 @@ pub struct Opened {
 
 /// Opens what the user named: files, globs, folders. Files of one rosbag2 folder are one recording, and so are
 /// `NAME_0.mcap`, `NAME_1.mcap`, .. (or `.db3`) of a folder that follow each other in time.
-pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, Error> {
+pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, InitError> {
     inputs.iter().try_for_each(|input| refuse(Path::new(input)))?;
     let entries = Manifest::of(inputs, out)?.entries;
-    let opened = entries.into_iter().map(open).collect::<Result<Vec<Opened>, Error>>()?;
+    let opened = entries.into_iter().map(open).collect::<Result<Vec<Opened>, InitError>>()?;
     let mut whole: Vec<Vec<Opened>> = Vec::new();
     for next in opened {
         match whole.last_mut() {
@@ -44,7 +43,7 @@ pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, Error> {
     whole.into_iter().filter_map(joined).collect()
 }
 
-fn open(entry: RecordingEntry) -> Result<Opened, Error> {
+fn open(entry: RecordingEntry) -> Result<Opened, InitError> {
     let failed = |source| RunError::Recording { recording: entry.name(), source };
     let recording = Recording::open(&entry.paths).map_err(failed)?;
     Ok(Opened { entry, recording })
@@ -77,8 +76,8 @@ fn part(path: &Path) -> Option<(String, u64)> {
 }
 
 /// What is no recording is told for what it is, with the way to one.
-fn refuse(path: &Path) -> Result<(), Error> {
-    let refused = |why: String| Err(Error::Manifest { what: path.display().to_string(), why });
+fn refuse(path: &Path) -> Result<(), InitError> {
+    let refused = |why: String| Err(ConfigError::Recordings { what: path.display().to_string(), why }.into());
     if is_url(path) {
         return Ok(());
     }

@@ -1,11 +1,11 @@
 //! The arm and the frames at its ends.
 
 use super::Draft;
-use crate::error::Error;
-use crate::init::page::{number, quoted, relative};
-use crate::init::proposal::Known;
-use crate::init::roles::Role;
-use crate::init::seats::lean;
+use crate::error::InitError;
+use crate::page::{number, quoted, relative};
+use crate::proposal::Known;
+use crate::roles::Role;
+use crate::seats::lean;
 use armcal_core::robust::median;
 use armcal_model::{Model, Motion, Moving};
 use nalgebra::Vector3;
@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 const LEANS_RAD: f64 = 0.15;
 
 impl Draft<'_> {
-    pub fn model(&mut self) -> Result<(), Error> {
+    pub fn model(&mut self) -> Result<(), InitError> {
         let Known { arm, sockets, .. } = self.known;
         self.page.section("[model]");
         if !arm.is_urdf() {
@@ -155,7 +155,7 @@ impl Draft<'_> {
 }
 
 /// Patterns of the parameters that are the zeros of the joints: rotations of their origins about their own axes.
-fn zeros(model: &Model) -> Result<Vec<String>, Error> {
+fn zeros(model: &Model) -> Result<Vec<String>, InitError> {
     let skeleton = model.skeleton(0, &model.nominal(), "base");
     let along = |moving: &Moving| {
         ["rx", "ry", "rz"]

@@ -1,13 +1,13 @@
 //! Recordings, streams, clock: what is read, and as what.
 
 use super::Draft;
-use crate::init::channels::BodyTopic;
-use crate::init::evidence::Evidence;
-use crate::init::page::{list, number, quoted, relative};
-use crate::init::points::Points;
-use crate::init::read::key;
-use crate::init::roles::Role;
-use crate::init::seats::tilts;
+use crate::channels::BodyTopic;
+use crate::evidence::Evidence;
+use crate::page::{list, number, quoted, relative};
+use crate::points::Points;
+use crate::read::key;
+use crate::roles::Role;
+use crate::seats::tilts;
 use armcal_config::recording_name;
 use armcal_recording::{JointUnit, LengthUnit, StreamReport};
 use armcal_table::Tilt;

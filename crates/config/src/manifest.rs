@@ -1,8 +1,7 @@
 //! Which recordings: from globs, files and bag folders, or from a manifest file.
 
 use super::pattern::matching;
-use crate::error::Error;
-use armcal_config::{ConfigError, RecordingEntry};
+use crate::{ConfigError, RecordingEntry};
 use armcal_recording::{input, is_recording, is_url, list, recordings_at, resolve, without_ending};
 use armcal_table::Tilt;
 use serde::Deserialize;
@@ -32,7 +31,7 @@ impl Manifest {
     ///
     /// # Errors
     /// Nothing found, a pattern that is none, a manifest among other inputs, a name given twice.
-    pub fn of(inputs: &[String], out: &Path) -> Result<Manifest, Error> {
+    pub fn of(inputs: &[String], out: &Path) -> Result<Manifest, ConfigError> {
         match inputs {
             [one] if is_manifest(Path::new(one)) => Manifest::read(Path::new(one)),
             _ => Manifest::found(inputs, out),
@@ -43,7 +42,7 @@ impl Manifest {
     ///
     /// # Errors
     /// A file that cannot be read, a syntax error with its line, no recording, a name given twice.
-    pub fn read(path: &Path) -> Result<Manifest, Error> {
+    pub fn read(path: &Path) -> Result<Manifest, ConfigError> {
         let at = |source| ConfigError::ReadFile { what: "manifest", path: path.to_owned(), source };
         let text = input::read_to_string(path, input::Kind::Data).map_err(at)?;
         let folder = std::path::absolute(path).map_err(at)?;
@@ -69,11 +68,11 @@ impl Manifest {
         Manifest { entries, pipeline }.checked(&path.display().to_string())
     }
 
-    fn found(inputs: &[String], out: &Path) -> Result<Manifest, Error> {
+    fn found(inputs: &[String], out: &Path) -> Result<Manifest, ConfigError> {
         let out = std::path::absolute(out).unwrap_or_else(|_| out.to_owned());
         let mut files = Vec::new();
         for input in inputs {
-            let bad = |why: String| Error::Manifest { what: input.clone(), why };
+            let bad = |why: String| ConfigError::Recordings { what: input.clone(), why };
             if is_manifest(Path::new(input)) {
                 return Err(bad("a manifest file must be the only input".into()));
             }
@@ -96,8 +95,8 @@ impl Manifest {
     }
 
     /// Gives every recording a name of its own.
-    fn checked(mut self, what: &str) -> Result<Manifest, Error> {
-        let bad = |why: String| Err(Error::Manifest { what: what.to_owned(), why });
+    fn checked(mut self, what: &str) -> Result<Manifest, ConfigError> {
+        let bad = |why: String| Err(ConfigError::Recordings { what: what.to_owned(), why });
         if let Some(i) = self.entries.iter().position(|e| e.paths.is_empty()) {
             return bad(format!("recording {} has no paths", i + 1));
         }
