@@ -17,9 +17,9 @@ pub enum Error {
     /// A name on the command line that means nothing.
     #[error(transparent)]
     Usage(Box<Error>),
-    /// A file in a campaign's folder that is not what it should be.
-    #[error("campaign {}: {why}", path.display())]
-    Campaign { path: PathBuf, why: String },
+    /// A whole archive.
+    #[error(transparent)]
+    Archive(#[from] armcal_archive::ArchiveError),
     /// A share that is none.
     #[error("--shard: {0}")]
     Shard(String),
@@ -29,9 +29,6 @@ pub enum Error {
     /// The system gives no threads.
     #[error("starting worker threads: {why}")]
     Threads { why: String },
-    /// A defect of armcal itself.
-    #[error("recording `{recording}`: armcal itself failed ({why}); please report it with the recording")]
-    Internal { recording: String, why: String },
     /// Writing results.
     #[error(transparent)]
     Report(#[from] armcal_report::ReportError),

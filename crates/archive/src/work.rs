@@ -2,10 +2,10 @@
 
 use super::key::Keys;
 use super::store::Store;
-use crate::error::Error;
-use crate::progress::Progress;
+use crate::error::ArchiveError;
 use armcal_config::{Pipeline, RecordingEntry};
 use armcal_report::{FailedRecording, campaign_row, write_all, write_brief};
+use armcal_stages::Silent;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Makes the result of one recording. Returns its folder, and whether it was there already.
@@ -18,7 +18,7 @@ pub(super) fn one(
     keys: &Keys,
     store: &Store,
     full: bool,
-) -> Result<(String, bool), Error> {
+) -> Result<(String, bool), ArchiveError> {
     let folder = Store::name(&entry.name(), &keys.of_recording(entry)?);
     if store.has(&folder) {
         return Ok((folder, true));
@@ -30,7 +30,7 @@ pub(super) fn one(
         Err(panic) => {
             let why = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
             let why = why.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
-            Err(Error::Internal { recording: entry.name(), why })
+            Err(ArchiveError::Internal { recording: entry.name(), why })
         }
     }
 }
@@ -41,18 +41,20 @@ fn make(
     store: &Store,
     folder: &str,
     full: bool,
-) -> Result<(), Error> {
-    let silent = Progress::silent();
-    let (mut run, recordings) = armcal_pipeline::settle(pipeline, &silent)?.diagnosed(pipeline, &silent);
+) -> Result<(), ArchiveError> {
+    let (mut run, recordings) = armcal_pipeline::settle(pipeline, &Silent)?.diagnosed(pipeline, &Silent);
     let made = store.begin()?;
     if full {
-        armcal_pipeline::add_refits(&mut run, pipeline, &silent)?;
+        armcal_pipeline::add_refits(&mut run, pipeline, &Silent)?;
         write_all(&run, &recordings, made.path(), &pipeline.output)?;
     } else {
         write_brief(&run, made.path())?;
     }
     let Some(row) = campaign_row(&run, entry.tilt, entry.load_kg) else {
-        return Err(Error::Internal { recording: entry.name(), why: "its run has no recording".into() });
+        return Err(ArchiveError::Internal {
+            recording: entry.name(),
+            why: "its run has no recording".into(),
+        });
     };
     store.finish(made, &row, folder)
 }

@@ -6,6 +6,10 @@
 //! was. [`map`] does a share of a manifest, on any machine that sees the folder, [`reduce`] puts the shares together; a
 //! batch is one share and its reduction, so all three ways give the same bytes.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
+mod counter;
+mod error;
 mod key;
 mod memory;
 mod once;
@@ -14,14 +18,14 @@ mod store;
 mod work;
 mod workers;
 
-pub use shard::Shard;
+pub use counter::Counter;
+pub use error::ArchiveError;
+pub use shard::{Receipt, Shard};
 
-use crate::error::Error;
-use crate::progress::Progress;
 use armcal_config::{Manifest, Pipeline};
 use armcal_report::{Campaign, FailedRecording, write_campaign};
 use key::Keys;
-use shard::{Done, Receipt};
+use shard::Done;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use store::Store;
@@ -42,16 +46,19 @@ pub struct Request<'a> {
 
 /// Works on every recording and puts them together. Returns what they say, the written files, and how many results were
 /// there already.
-pub fn batch(request: &Request<'_>, progress: &Progress) -> Result<(Campaign, Vec<PathBuf>, usize), Error> {
-    let receipt = work_on(request, Shard::WHOLE, progress)?;
+pub fn batch(
+    request: &Request<'_>,
+    counter: &dyn Counter,
+) -> Result<(Campaign, Vec<PathBuf>, usize), ArchiveError> {
+    let receipt = work_on(request, Shard::WHOLE, counter)?;
     let skipped = receipt.skipped;
     let (campaign, written) = put_together(vec![receipt], request.out)?;
     Ok((campaign, written, skipped))
 }
 
 /// Works on one share of the manifest, and leaves a receipt for [`reduce`].
-pub fn map(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<Receipt, Error> {
-    let receipt = work_on(request, shard, progress)?;
+pub fn map(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
+    let receipt = work_on(request, shard, counter)?;
     receipt.write(request.out)?;
     Ok(receipt)
 }
@@ -65,18 +72,18 @@ pub fn receipt_file(shard: Shard, out: &Path) -> PathBuf {
 ///
 /// # Errors
 /// Shares that are missing, doubled, or not of one manifest and pipeline; each by its name.
-pub fn reduce(out: &Path) -> Result<(Campaign, Vec<PathBuf>), Error> {
+pub fn reduce(out: &Path) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
     put_together(shard::receipts(out)?, out)
 }
 
-fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<Receipt, Error> {
+fn work_on(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
     let Request { manifest, pipeline, out, .. } = request;
     memory::keep_little();
     let store = Store::open(out)?;
     let keys = Keys::new(pipeline, request.full, out)?;
     let own: Vec<usize> = (0..manifest.entries.len()).filter(|i| shard.has(*i)).collect();
-    progress.count(own.len());
-    let jobs = request.jobs.unwrap_or_else(crate::threads::cores);
+    counter.count(own.len());
+    let jobs = request.jobs.unwrap_or_else(workers::cores);
     let done = workers::each(own.len(), jobs, |i| {
         let index = own[i];
         let entry = &manifest.entries[index];
@@ -84,11 +91,11 @@ fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
             Ok((folder, skipped)) => (Done::Calibrated { index, folder }, skipped),
             Err(e) => {
                 let failed = FailedRecording { why: e.to_string(), ..work::named(entry) };
-                progress.say(&format!("failed: {}: {}", failed.recording, failed.why));
+                counter.say(&format!("failed: {}: {}", failed.recording, failed.why));
                 (Done::Failed { index, failed }, false)
             }
         };
-        progress.advance(&entry.name());
+        counter.advance(&entry.name());
         if (i + 1) % memory::EVERY == 0 {
             memory::give_back();
         }
@@ -100,7 +107,7 @@ fn work_on(request: &Request<'_>, shard: Shard, progress: &Progress) -> Result<R
     Ok(Receipt::new(shard, campaign, &pipeline.name, manifest.entries.len(), done, skipped))
 }
 
-fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<PathBuf>), Error> {
+fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
     let (pipeline, done) = shard::together(receipts, out)?;
     let store = Store::open(out)?;
     let (mut rows, mut folders, mut failed) = (Vec::new(), Vec::new(), Vec::new());

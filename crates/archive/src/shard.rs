@@ -1,7 +1,7 @@
 //! Shares of a manifest, and the receipts that say what became of them.
 
 use super::store;
-use crate::error::Error;
+use crate::error::ArchiveError;
 use armcal_recording::{input, make_folder_in};
 use armcal_report::{FailedRecording, VERSION};
 use serde::{Deserialize, Serialize};
@@ -134,17 +134,17 @@ impl Receipt {
         out.join(RECEIPTS).join(format!("{}-of-{}.json", shard.number, shard.of))
     }
 
-    pub(super) fn write(&self, out: &Path) -> Result<(), Error> {
-        make_folder_in(out, RECEIPTS).map_err(Error::Output)?;
-        let text = serde_json::to_vec_pretty(self).map_err(Error::Json)?;
+    pub(super) fn write(&self, out: &Path) -> Result<(), ArchiveError> {
+        make_folder_in(out, RECEIPTS).map_err(ArchiveError::Output)?;
+        let text = serde_json::to_vec_pretty(self).map_err(ArchiveError::Json)?;
         store::write_one(&Receipt::file(self.shard, out), &text)
     }
 }
 
 /// The receipts in a campaign's folder.
-pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, Error> {
+pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, ArchiveError> {
     let folder = out.join(RECEIPTS);
-    let entries = std::fs::read_dir(&folder).map_err(|e| Error::Campaign {
+    let entries = std::fs::read_dir(&folder).map_err(|e| ArchiveError::Campaign {
         path: folder.clone(),
         why: format!("{e}; `armcal map` leaves a receipt of every share there"),
     })?;
@@ -152,7 +152,7 @@ pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, Error> {
     paths.retain(|p| p.extension().is_some_and(|e| e == "json"));
     paths.sort();
     let read = |path: &std::path::PathBuf| {
-        let bad = |why: String| Error::Campaign { path: path.clone(), why };
+        let bad = |why: String| ArchiveError::Campaign { path: path.clone(), why };
         let text = input::read_to_string(path, input::Kind::Data).map_err(|e| bad(e.to_string()))?;
         let receipt: Receipt = serde_json::from_str(&text).map_err(|e| bad(format!("{e}; map it again")))?;
         Ok(receipt)
@@ -164,8 +164,8 @@ pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, Error> {
 ///
 /// # Errors
 /// Shares of different campaigns or partitions, missing ones, a recording in two of them or in none.
-pub(super) fn together(receipts: Vec<Receipt>, out: &Path) -> Result<(String, Vec<Done>), Error> {
-    let bad = |why: String| Error::Campaign { path: out.to_owned(), why };
+pub(super) fn together(receipts: Vec<Receipt>, out: &Path) -> Result<(String, Vec<Done>), ArchiveError> {
+    let bad = |why: String| ArchiveError::Campaign { path: out.to_owned(), why };
     let Some(first) = receipts.first().cloned() else {
         return Err(bad("holds no share; run `armcal map` first".into()));
     };

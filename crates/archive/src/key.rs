@@ -1,6 +1,6 @@
 //! What a result is made from: the files, what is declared about them, the pipeline, the version.
 
-use crate::error::Error;
+use crate::error::ArchiveError;
 use armcal_config::ConfigError;
 use armcal_config::{Manifest, Pipeline, RecordingEntry};
 use armcal_recording::{atomic, identity_of, input, make_folder_in, read_with};
@@ -43,7 +43,7 @@ struct Seen {
 impl Keys {
     /// # Errors
     /// A model or board file of the pipeline that cannot be read.
-    pub fn new(pipeline: &Pipeline, full: bool, out: &Path) -> Result<Keys, Error> {
+    pub fn new(pipeline: &Pipeline, full: bool, out: &Path) -> Result<Keys, ArchiveError> {
         let mut parts =
             vec![FORMAT.to_owned(), VERSION.to_owned(), full.to_string(), settings(&pipeline.text)];
         let models = pipeline.models().into_iter();
@@ -61,7 +61,7 @@ impl Keys {
     ///
     /// # Errors
     /// A file that cannot be read.
-    pub fn of_recording(&self, entry: &RecordingEntry) -> Result<String, Error> {
+    pub fn of_recording(&self, entry: &RecordingEntry) -> Result<String, ArchiveError> {
         let in_recording = |source| RunError::Recording { recording: entry.name(), source };
         let mut parts = vec![self.common.clone(), declared(entry)];
         for path in &entry.paths {

@@ -1,6 +1,6 @@
 //! The folder of a campaign: one folder a result, which is there whole or not at all.
 
-use crate::error::Error;
+use crate::error::ArchiveError;
 use armcal_campaign::Row;
 use armcal_recording::{atomic, input, make_folder_in};
 use armcal_report::{DwellMark, OBSERVATIONS_FILE, PastObservations, ReportError};
@@ -35,8 +35,8 @@ impl Store {
     ///
     /// # Errors
     /// A folder that cannot be made.
-    pub fn open(out: &Path) -> Result<Store, Error> {
-        let results = make_folder_in(out, RESULTS).map_err(Error::Output)?;
+    pub fn open(out: &Path) -> Result<Store, ArchiveError> {
+        let results = make_folder_in(out, RESULTS).map_err(ArchiveError::Output)?;
         let store = Store { results };
         store.sweep();
         Ok(store)
@@ -58,9 +58,9 @@ impl Store {
     ///
     /// # Errors
     /// A row that is missing or not readable.
-    pub fn row(&self, folder: &str) -> Result<Row, Error> {
+    pub fn row(&self, folder: &str) -> Result<Row, ArchiveError> {
         let path = self.results.join(folder).join(ROW);
-        let bad = |why: String| Error::Campaign { path: path.clone(), why };
+        let bad = |why: String| ArchiveError::Campaign { path: path.clone(), why };
         let text = input::read_to_string(&path, input::Kind::Data)
             .map_err(|e| bad(format!("{e}; map its shard again")))?;
         serde_json::from_str(&text).map_err(|e| bad(e.to_string()))
@@ -70,7 +70,7 @@ impl Store {
     ///
     /// # Errors
     /// Observations that are missing or not readable.
-    pub fn marks(&self, folder: &str) -> Result<Vec<DwellMark>, Error> {
+    pub fn marks(&self, folder: &str) -> Result<Vec<DwellMark>, ArchiveError> {
         let past = PastObservations::open(&self.results.join(folder).join(OBSERVATIONS_FILE))?;
         Ok(past.recordings.iter().flat_map(|r| r.marks()).collect())
     }
@@ -79,8 +79,8 @@ impl Store {
     ///
     /// # Errors
     /// A folder that cannot be made or locked.
-    pub fn begin(&self) -> Result<Unfinished, Error> {
-        let at = |source| Error::Folder { path: self.results.clone(), source };
+    pub fn begin(&self) -> Result<Unfinished, ArchiveError> {
+        let at = |source| ArchiveError::Folder { path: self.results.clone(), source };
         let _gate = self.gate().map_err(at)?;
         let mut folder = tempfile::Builder::new();
         let folder = folder
@@ -99,10 +99,10 @@ impl Store {
     ///
     /// # Errors
     /// A row that cannot be written, a folder that cannot be renamed.
-    pub fn finish(&self, made: Unfinished, row: &Row, folder: &str) -> Result<(), Error> {
+    pub fn finish(&self, made: Unfinished, row: &Row, folder: &str) -> Result<(), ArchiveError> {
         let target = self.results.join(folder);
-        let at = |source| Error::Folder { path: target.clone(), source };
-        write_one(&made.path().join(ROW), &serde_json::to_vec_pretty(row).map_err(Error::Json)?)?;
+        let at = |source| ArchiveError::Folder { path: target.clone(), source };
+        write_one(&made.path().join(ROW), &serde_json::to_vec_pretty(row).map_err(ArchiveError::Json)?)?;
         readable_by_all(made.path()).map_err(at)?;
         match named(made.path(), &target) {
             Ok(()) => {
@@ -148,7 +148,7 @@ pub(super) fn relative(folder: &str) -> String {
 }
 
 /// Writes a file whole or not at all.
-pub(super) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+pub(super) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), ArchiveError> {
     let failed = |source| ReportError::Write { path: path.to_owned(), source: Box::new(source) };
     Ok(atomic::write(path, bytes).map_err(failed)?)
 }

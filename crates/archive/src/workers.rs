@@ -1,7 +1,6 @@
 //! Several recordings at a time.
 
 use super::memory;
-use crate::threads::cores;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -46,6 +45,11 @@ pub(super) fn each<T: Send>(count: usize, jobs: usize, work: impl Fn(usize) -> T
     let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_by_key(|(i, _)| *i);
     done.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Cores of this machine that the process may use.
+pub(super) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// Threads of a worker, or one, where the system does not give so many.

@@ -1,7 +1,7 @@
 //! Recordings of a campaign that hold what another one holds already.
 
 use super::store::Store;
-use crate::error::Error;
+use crate::error::ArchiveError;
 use armcal_campaign::Row;
 use armcal_report::{DwellMark, Repeat, also_in};
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::collections::btree_map::Entry;
 ///
 /// # Errors
 /// Observations of a result that cannot be read.
-pub(super) fn repeats(store: &Store, rows: &[Row], folders: &[String]) -> Result<Vec<Repeat>, Error> {
+pub(super) fn repeats(store: &Store, rows: &[Row], folders: &[String]) -> Result<Vec<Repeat>, ArchiveError> {
     let mut marks: BTreeMap<usize, Vec<DwellMark>> = BTreeMap::new();
     let mut repeats: Vec<Repeat> = Vec::new();
     let mut originals: Vec<usize> = Vec::new();
