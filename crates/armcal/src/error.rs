@@ -1,5 +1,6 @@
 //! Everything that stops a command, in words that say what was being done and to what.
 
+use armcal_check::CheckError;
 use armcal_init::InitError;
 use armcal_stages::RunError;
 use std::path::PathBuf;
@@ -91,22 +92,9 @@ pub enum Error {
     /// A folder for results cannot be made.
     #[error("making the folder {}: {source}", path.display())]
     Folder { path: PathBuf, source: std::io::Error },
-    /// `armcal check` of a pipeline that limits nothing.
-    #[error(
-        "pipeline {}: there is no limit to check; add a [check] section, for instance `max_over_floor = 1.5`, \
-         `max_holdout_mean_mm = 0.5` and `verdicts = [\"nothing_missing\"]` (docs/check.md lists them)",
-        path.display()
-    )]
-    NoLimits { path: PathBuf },
-    /// What `[check]` compares with is not a result.
-    #[error(
-        "check.reference: {} {problem}; name the summary.json, run.mcap or folder of an accepted `armcal run`",
-        path.display()
-    )]
-    BadReference { path: PathBuf, problem: String },
-    /// Writing JUnit XML.
-    #[error("writing the checks as JUnit XML: {0}")]
-    Junit(Box<dyn std::error::Error + Send + Sync>),
+    /// Limits that cannot be judged by.
+    #[error(transparent)]
+    Check(#[from] CheckError),
     /// Reporting a failure failed too.
     #[error("{first}; and {second}")]
     Also { first: Box<Error>, second: Box<Error> },
@@ -150,7 +138,7 @@ impl Error {
     /// What the program exits with: 2 where the user asked for something that cannot be, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::NoLimits { .. }
+            Error::Check(CheckError::NoLimits { .. })
             | Error::Usage(_)
             | Error::Init(InitError::Usage { .. })
             | Error::BadOption { .. }

@@ -4,7 +4,6 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
-pub mod check;
 pub mod cli;
 pub mod commands;
 pub mod compensate;

@@ -3,8 +3,8 @@
 //! None of these may panic or hang; what a reader accepts must also survive what is done with it first.
 
 use armcal::Pipeline;
-use armcal::check::reference::Calibrated;
 use armcal::compensate::targets;
+use armcal_check::reference::Calibrated;
 use armcal_lab::LabConfig;
 use armcal_lab::pair::PairConfig;
 use armcal_model::{Chain, EffectSpec, EffectTable, Frames, Model, Session};

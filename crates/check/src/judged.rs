@@ -5,7 +5,7 @@ use super::measured::Check;
 use super::numbers::{self, Told, all_warnings};
 use super::reference::Calibrated;
 use super::{frame_shifts, shifts, verdict};
-use crate::error::Error;
+use crate::error::CheckError;
 use armcal_core::Severity;
 use armcal_diagnose::Verdict;
 use armcal_report::{Run, VERSION, printable};
@@ -44,7 +44,7 @@ pub enum Judgement {
 }
 
 /// Judges a diagnosed run.
-pub fn judge(run: &Run, limits: &Limits) -> Result<Judged, Error> {
+pub fn judge(run: &Run, limits: &Limits) -> Result<Judged, CheckError> {
     let mut checks = numbers::errors(run, limits);
     checks.extend(numbers::dwells(run, limits));
     checks.extend(verdict::verdict(run, limits));

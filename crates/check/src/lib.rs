@@ -5,6 +5,9 @@
 //! [`shifts`] parameters and [`frame_shifts`] base, tip and boards against the [`reference`](mod@reference). What a broken
 //! limit says about its cause comes from [`reasons`]. The [`Judged`] whole is shown by [`text`], [`junit`] and [`markdown`].
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
+mod error;
 mod frame_shifts;
 mod judged;
 pub mod junit;
@@ -18,6 +21,7 @@ mod shifts;
 pub mod text;
 mod verdict;
 
+pub use error::CheckError;
 pub use judged::{Judged, Judgement, SCHEMA, judge};
 pub use limits::Limits;
 pub use measured::{Check, Measured};

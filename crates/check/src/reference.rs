@@ -1,6 +1,6 @@
 //! A calibrated arm as `summary.json` tells it: the accepted result, and the one to be judged.
 
-use crate::error::Error;
+use crate::error::CheckError;
 use armcal_core::{Pose, RollPitchYaw};
 use armcal_recording::input;
 use armcal_report::{PastRun, Run, SCHEMA, summary_json};
@@ -59,8 +59,8 @@ pub struct FittedFrame {
 
 impl Calibrated {
     /// Reads a `summary.json`, the one in a `run.mcap`, or that of a folder of results.
-    pub fn open(path: &Path) -> Result<Calibrated, Error> {
-        let bad = |problem: String| Error::BadReference { path: path.to_owned(), problem };
+    pub fn open(path: &Path) -> Result<Calibrated, CheckError> {
+        let bad = |problem: String| CheckError::BadReference { path: path.to_owned(), problem };
         let calibrated: Result<Calibrated, _> = if path.extension().is_some_and(|e| e == "mcap") {
             serde_json::from_value(PastRun::open(path)?.summary)
         } else {
@@ -78,8 +78,8 @@ impl Calibrated {
     }
 
     /// The result to be judged.
-    pub fn of(run: &Run) -> Result<Calibrated, Error> {
-        serde_json::from_str(&summary_json(run)?).map_err(Error::Json)
+    pub fn of(run: &Run) -> Result<Calibrated, CheckError> {
+        serde_json::from_str(&summary_json(run)?).map_err(CheckError::Json)
     }
 
     /// Parameters of the robot and of its effects; frames are compared as frames.

@@ -1,7 +1,7 @@
 //! The limits of a pipeline, ready to judge.
 
 use super::reference::Calibrated;
-use crate::error::Error;
+use crate::error::CheckError;
 use armcal_calibrate::HoldoutConfig;
 use armcal_config::ConfigError;
 use armcal_config::{CheckSection, Surroundings};
@@ -31,10 +31,10 @@ impl Limits {
     ///
     /// # Errors
     /// No limit at all, one that cannot be meant, an effect or joint that does not exist, a reference that cannot be read.
-    pub fn of(pipeline: &Pipeline, path: &Path) -> Result<Limits, Error> {
+    pub fn of(pipeline: &Pipeline, path: &Path) -> Result<Limits, CheckError> {
         let section = pipeline.check.clone();
         if !section.has_limits() {
-            return Err(Error::NoLimits { path: path.to_owned() });
+            return Err(CheckError::NoLimits { path: path.to_owned() });
         }
         let refused =
             |key: String, problem: String| ConfigError::Contradiction { path: path.to_owned(), key, problem };

@@ -3,14 +3,14 @@
 //! Without times and identifiers, so that the same result gives the same bytes.
 
 use super::{Check, Judged};
-use crate::error::Error;
+use crate::error::CheckError;
 use armcal_report::VERSION;
 use quick_junit::{NonSuccessKind, Property, Report, TestCase, TestCaseStatus, TestSuite};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, Writer};
 
 /// Every check a case; a broken one fails with its sentence, and its causes in the body.
-pub fn junit(judged: &Judged) -> Result<String, Error> {
+pub fn junit(judged: &Judged) -> Result<String, CheckError> {
     let mut suite = suite(&judged.pipeline);
     suite.add_property(Property::new("armcal.line", judged.line.as_str()));
     suite.add_test_cases(judged.checks.iter().map(|check| case(&judged.pipeline, check)));
@@ -21,7 +21,7 @@ pub fn junit(judged: &Judged) -> Result<String, Error> {
 }
 
 /// A run that did not come to its checks: one case in error.
-pub fn junit_failed(pipeline: &str, error: &str) -> Result<String, Error> {
+pub fn junit_failed(pipeline: &str, error: &str) -> Result<String, CheckError> {
     let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
     status.set_message(error).set_type("armcal.failed").set_description(error);
     let mut case = TestCase::new("run", status);
@@ -61,13 +61,13 @@ fn class(pipeline: &str) -> String {
     format!("armcal.{pipeline}")
 }
 
-fn written(suite: TestSuite) -> Result<String, Error> {
+fn written(suite: TestSuite) -> Result<String, CheckError> {
     let mut report = Report::new("armcal check");
     report.add_test_suite(suite);
-    let xml = report.to_string().map_err(|e| Error::Junit(Box::new(e)))?;
+    let xml = report.to_string().map_err(|e| CheckError::Junit(Box::new(e)))?;
     // The library drops control characters; these two are no characters of XML either.
     let xml = xml.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
-    valid(&xml).map_err(|e| Error::Junit(Box::new(e)))
+    valid(&xml).map_err(|e| CheckError::Junit(Box::new(e)))
 }
 
 /// Without the `skipped` count of the root: the schema of Jenkins knows it of a suite only, and its xUnit plugin refuses
