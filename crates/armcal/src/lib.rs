@@ -10,7 +10,6 @@ pub mod compensate;
 pub mod dispatch;
 pub mod error;
 pub mod extended;
-pub mod plan;
 pub mod pool;
 pub mod progress;
 pub mod score;

@@ -1,16 +1,16 @@
 //! The greedy choice, and what it promises in words.
 
 use super::advice::sensor;
+use super::discrimination::{Geometry, PoolDwell, Survivor, apart, plan};
 use super::pool::{Possible, pool};
 use super::reach::Limits;
 use super::rivals::{Rival, Standing};
 use super::{Allowed, Known, Pair, Proposal, Proposed};
-use crate::error::Error;
 use armcal_calibrate::linearise;
 use armcal_core::Observation;
 use armcal_diagnose::DiagnosisConfig;
 use armcal_model::{EffectSpec, Model, Session};
-use armcal_plan::{Geometry, PoolDwell, Survivor, apart, plan};
+use armcal_stages::RunError;
 use nalgebra::{DMatrix, DVector};
 
 /// At this Delta the evidence names the true one (Bayes factor above 20 in 85 % of cases).
@@ -31,7 +31,7 @@ pub fn propose(
     standing: &Standing,
     allowed: &Allowed,
     config: &DiagnosisConfig,
-) -> Result<Proposal, Error> {
+) -> Result<Proposal, RunError> {
     let limits = Limits::of(known, allowed);
     let weighed = Weighed::new(known, standing, &limits, allowed)?;
     let choice = weighed.choose(standing, allowed.dwells, config);
@@ -90,7 +90,7 @@ impl Weighed {
         standing: &Standing,
         limits: &Limits,
         allowed: &Allowed,
-    ) -> Result<Weighed, Error> {
+    ) -> Result<Weighed, RunError> {
         let specs: Vec<EffectSpec> = standing.rivals.iter().map(|r| r.spec.clone()).collect();
         let pool = pool(known, limits, allowed, &specs);
         let possible: Vec<Observation> = pool.iter().map(|p| p.observation.clone()).collect();

@@ -1,6 +1,5 @@
 //! Which explanations are to be told apart.
 
-use crate::error::Error;
 use armcal_diagnose::{Diagnosis, ParameterReport, UnknownReport, Verdict};
 use armcal_model::{EffectSpec, Family};
 use armcal_stages::RunError;
@@ -32,7 +31,7 @@ pub struct Standing {
 
 /// What a diagnosis leaves standing: the first ambiguous set; the unlisted shape against the best names; otherwise the
 /// effects that could not be tested, against nothing.
-pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Error> {
+pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, RunError> {
     let parse = |name: &String| EffectSpec::parse(name, joints).map_err(RunError::Model);
     let open = diagnosis.effects.iter().position(|e| e.set.len() > 1);
     let mut certain = Vec::new();
@@ -65,19 +64,23 @@ pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Er
 }
 
 /// The explanations a user names; one alone is told from nothing.
-pub fn named(words: &[String], diagnosis: Option<&Diagnosis>, joints: &[String]) -> Result<Standing, Error> {
+pub fn named(
+    words: &[String],
+    diagnosis: Option<&Diagnosis>,
+    joints: &[String],
+) -> Result<Standing, RunError> {
     let one = |word: &String| match diagnosis {
         Some(diagnosis) => rival(diagnosis, word, joints),
         None => Ok(Rival { spec: EffectSpec::parse(word, joints)?, sizes: Vec::new() }),
     };
-    let rivals = words.iter().map(one).collect::<Result<Vec<_>, Error>>()?;
+    let rivals = words.iter().map(one).collect::<Result<Vec<_>, RunError>>()?;
     let nothing = rivals.len() == 1;
     Ok(Standing { rivals, nothing, certain: Vec::new(), why: "you named them".to_owned() })
 }
 
 /// The effects that could not be tested and that depend on pose, direction or load, the most probable first. Events and
 /// drifts are no matter of where the arm goes.
-fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, Error> {
+fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, RunError> {
     let rank = |name: &str| diagnosis.candidates.iter().position(|c| c.spec == name).unwrap_or(usize::MAX);
     let mut names: Vec<&String> = diagnosis.not_testable.iter().map(|n| &n.effect).collect();
     names.sort_by_key(|name| rank(name));
@@ -93,7 +96,7 @@ fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, Erro
 }
 
 /// An effect at the size that the data ask for, where they ask for one.
-fn rival(diagnosis: &Diagnosis, name: &str, joints: &[String]) -> Result<Rival, Error> {
+fn rival(diagnosis: &Diagnosis, name: &str, joints: &[String]) -> Result<Rival, RunError> {
     let spec = EffectSpec::parse(name, joints)?;
     let words = spec.to_string();
     let seen = diagnosis.candidates.iter().find(|c| c.spec == words);
