@@ -92,6 +92,9 @@ pub enum Error {
     /// A folder for results cannot be made.
     #[error("making the folder {}: {source}", path.display())]
     Folder { path: PathBuf, source: std::io::Error },
+    /// Results that cannot be pooled.
+    #[error(transparent)]
+    Pool(#[from] armcal_pipeline::PoolError),
     /// Limits that cannot be judged by.
     #[error(transparent)]
     Check(#[from] CheckError),

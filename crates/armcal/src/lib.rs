@@ -10,7 +10,6 @@ pub mod compensate;
 pub mod dispatch;
 pub mod error;
 pub mod extended;
-pub mod pool;
 pub mod progress;
 pub mod score;
 pub mod stdout;

@@ -3,18 +3,21 @@
 //! results -> [`collect`] -> one model with what each recording has for itself -> calibration -> diagnosis -> [`Run`].
 
 mod collect;
+mod error;
 
-pub use collect::{Collected, CollectedRecording, collect};
+pub use error::PoolError;
 
-use crate::error::Error;
-use crate::progress::Progress;
+use crate::diagnosed::diagnose_again;
+use crate::refits::add_refits;
+use crate::settled::run_of;
 use armcal_calibrate::{FitConfig, HoldoutConfig, align_frames, calibrate};
 use armcal_config::{BoardPose, FramePose, Pipeline};
 use armcal_core::Pose;
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
 use armcal_report::{Run, Undiagnosed};
-use armcal_stages::frames;
 use armcal_stages::joined_tips::place_bases;
+use armcal_stages::{Steps, declare, frames, with_effects};
+use collect::{Collected, CollectedRecording, collect};
 use std::path::PathBuf;
 
 /// Free parameters up to which what is missing is looked for: the search works on all of them at once.
@@ -33,7 +36,7 @@ pub struct Pooled {
 /// # Errors
 /// Results that are missing, or of another arm, board or setting than the pipeline's, each by name; and what can
 /// go wrong in a fit.
-pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Result<Pooled, Error> {
+pub fn pool(pipeline: &Pipeline, folders: &[PathBuf], progress: &dyn Steps) -> Result<Pooled, PoolError> {
     progress.step("reading results");
     let (model_texts, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
@@ -41,7 +44,7 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
     let geometry = geometry(pipeline, chain, &collected)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
     let observations = collected.observations;
-    let model = armcal_stages::with_effects(pipeline, &geometry, &effects, &observations)?;
+    let model = with_effects(pipeline, &geometry, &effects, &observations)?;
 
     // Shorter ways end as near, but not at the bits that pools have ended at so far.
     let config = FitConfig { every_step: true, ..pipeline.fit.clone() };
@@ -61,20 +64,20 @@ pub fn run(pipeline: &Pipeline, folders: &[PathBuf], progress: &Progress) -> Res
         board,
         transfer,
         warnings: collected.warnings,
-        ..armcal_pipeline::run_of(pipeline, model_texts, model, (observations, session), calibration)
+        ..run_of(pipeline, model_texts, model, (observations, session), calibration)
     };
     let free = run.model.parameters().iter().filter(|p| p.free).count();
     if free > DIAGNOSED_PARAMETERS && pipeline.diagnosis.enabled {
         run.undiagnosed = Some(Undiagnosed::TooLarge { free, most: DIAGNOSED_PARAMETERS });
     } else {
-        armcal_pipeline::diagnose_again(&mut run, pipeline, progress);
-        armcal_pipeline::add_refits(&mut run, pipeline, progress)?;
+        diagnose_again(&mut run, pipeline, progress);
+        add_refits(&mut run, pipeline, progress)?;
     }
     Ok(Pooled { run, geometry })
 }
 
 /// The nominal arm among the frames of all recordings, as one run of them together would have it.
-fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<Model, Error> {
+fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<Model, PoolError> {
     let own =
         |r: &CollectedRecording, base_in_world| RecordingStart { name: r.run.name.clone(), base_in_world };
     let recordings = &collected.recordings;
@@ -100,7 +103,7 @@ fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<
     let tip = pipeline.frames.tip.frame("tip", pipeline.fit.use_orientation);
     let boards = recordings.iter().filter_map(board).collect();
     let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards })?;
-    armcal_stages::declare(&mut model, pipeline)?;
+    declare(&mut model, pipeline)?;
     // Each recording knows its own board alone, so that work grows with their number and no faster.
     let own = recordings.iter().map(|r| own(r, measured.then_some(r.base))).collect();
     model.ask_own(own, pipeline.pool.per_recording.clone());

@@ -1,6 +1,6 @@
 //! Finding the results of earlier runs, and checking that they belong together.
 
-use crate::error::Error;
+use super::PoolError;
 use armcal_config::ConfigError;
 use armcal_config::{BoardPose, ClosedChainSection, ClosureKind, FramePose, ObservationsSection, Pipeline};
 use armcal_core::{Against, Dwell, Observation, Pose, Severity, Stage, Warning};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 /// What the results hold together.
 #[derive(Debug, Clone)]
-pub struct Collected {
+pub(super) struct Collected {
     /// The recordings in the order of time.
     pub recordings: Vec<CollectedRecording>,
     /// Their observations, in the same order and with the index of the recording in it.
@@ -27,7 +27,7 @@ pub struct Collected {
 
 /// One recording.
 #[derive(Debug, Clone)]
-pub struct CollectedRecording {
+pub(super) struct CollectedRecording {
     /// For the report.
     pub run: RecordingRun,
     /// Where the base started (world_from_base).
@@ -46,18 +46,18 @@ struct Found {
 ///
 /// # Errors
 /// A folder without any, a result of another arm, board or setting than the pipeline's.
-pub fn collect(
+pub(super) fn collect(
     pipeline: &Pipeline,
     model_text: &str,
     board: Option<&Board>,
     folders: &[PathBuf],
-) -> Result<Collected, Error> {
+) -> Result<Collected, PoolError> {
     let facts = board.map(BoardFacts::of);
     let mut found = Vec::new();
     for result in results(folders)? {
         let past = PastObservations::open(&result)?;
         if let Some(problem) = contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
-            return Err(Error::Result { path: result, problem: format!("cannot be pooled: {problem}") });
+            return Err(PoolError::Result { path: result, problem: format!("cannot be pooled: {problem}") });
         }
         let recordings = past.recordings.into_iter();
         found.extend(recordings.map(|recording| Found { result: result.clone(), recording }));
@@ -66,7 +66,7 @@ pub fn collect(
 }
 
 /// All of them in the order of time, each under a name of its own; what two hold counts once.
-fn together(mut found: Vec<Found>) -> Result<Collected, Error> {
+fn together(mut found: Vec<Found>) -> Result<Collected, PoolError> {
     let mut warnings = Vec::new();
     found.retain(|f| {
         let empty = f.recording.observations.is_empty();
@@ -170,7 +170,7 @@ fn dwell(o: &Observation) -> Dwell {
 }
 
 /// Every file of observations in the folders and below, each once, in the order of the paths.
-fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
+fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, PoolError> {
     let mut all = BTreeSet::new();
     for folder in folders {
         let mut here = BTreeSet::new();
@@ -178,7 +178,7 @@ fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
         if here.is_empty() {
             let problem = "holds no observations.json, in none of its folders: name the results of `armcal run`, and run older ones \
                            again";
-            return Err(Error::Result { path: folder.clone(), problem: problem.to_owned() });
+            return Err(PoolError::Result { path: folder.clone(), problem: problem.to_owned() });
         }
         all.extend(here);
     }
@@ -188,7 +188,7 @@ fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, Error> {
     Ok(all)
 }
 
-fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
+fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), PoolError> {
     // What is no folder is a result, or is told why it is none by whoever reads it.
     if path.exists() && !path.is_dir() {
         found.insert(path.to_owned());
