@@ -7,8 +7,8 @@ use crate::commands::{
 };
 use crate::error::Error;
 use crate::stdout::tell;
-use crate::transfer::Asked;
 use armcal_config::Manifest;
+use armcal_held_out::Asked;
 use armcal_recording::losses;
 use armcal_report::Detail;
 use clap::CommandFactory as _;

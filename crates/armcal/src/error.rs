@@ -1,6 +1,7 @@
 //! Everything that stops a command, in words that say what was being done and to what.
 
 use armcal_check::CheckError;
+use armcal_held_out::HeldOutError;
 use armcal_init::InitError;
 use armcal_stages::RunError;
 use std::path::PathBuf;
@@ -50,9 +51,6 @@ pub enum Error {
     /// A result of an earlier run that cannot be used here, or a folder without any.
     #[error("{} {problem}", path.display())]
     Result { path: PathBuf, problem: String },
-    /// Judging by ISO 9283.
-    #[error("judging by ISO 9283: {0}")]
-    Iso(#[from] armcal_iso9283::IsoError),
     /// A value of an option that cannot be used.
     #[error("{option} {value}: {problem}")]
     BadOption { option: &'static str, value: String, problem: String },
@@ -71,9 +69,9 @@ pub enum Error {
     /// A sealed scenario's pipeline switches the diagnosis off.
     #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
     NotDiagnosed,
-    /// `armcal transfer` to a session that shows nothing.
-    #[error("no dwell of `{pipeline}` has a place that anything could be judged by; see `armcal run` of it")]
-    NothingToJudge { pipeline: String },
+    /// A model that cannot be judged on other recordings.
+    #[error(transparent)]
+    HeldOut(#[from] HeldOutError),
     /// `armcal add suggested` where nothing is, or nothing that holds elsewhere.
     #[error(
         "the diagnosis of `{pipeline}` suggests no effect{}; name one (see `armcal effects`)",
@@ -144,6 +142,7 @@ impl Error {
             Error::Check(CheckError::NoLimits { .. })
             | Error::Usage(_)
             | Error::Init(InitError::Usage { .. })
+            | Error::HeldOut(HeldOutError::Usage(_))
             | Error::BadOption { .. }
             | Error::Shard(_)
             | Error::NoPipeline => 2,

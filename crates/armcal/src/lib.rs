@@ -14,8 +14,6 @@ pub mod progress;
 pub mod score;
 pub mod stdout;
 pub mod threads;
-pub mod transfer;
-pub mod verify;
 pub mod view;
 pub mod write;
 

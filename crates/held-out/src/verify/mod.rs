@@ -5,27 +5,18 @@
 mod iso;
 mod motion;
 mod once;
-mod past;
 mod point;
 mod told;
 
-pub(crate) use past::{lasts, place_arms};
-
-use armcal_stages::RunError;
-use past::place;
-
-use crate::error::Error;
-use crate::progress::Progress;
+use crate::error::HeldOutError;
+use crate::past::place;
 use armcal_config::{BoardPose, Pipeline};
-use armcal_stages::Placed;
-use armcal_stages::associated::Associated;
-use armcal_stages::measures::Measures;
-
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
 use armcal_report::{Closing, PastModel, PathSample, Verification, VerifiedRecording, open_model};
-use armcal_stages::Seen;
-use armcal_stages::{frames, observe, perceive};
+use armcal_stages::associated::Associated;
+use armcal_stages::measures::Measures;
+use armcal_stages::{Placed, RunError, Seen, Steps, frames, observe, perceive};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
@@ -38,7 +29,11 @@ const OF_NOMINAL_CLOCK: [&str; 4] =
     ["clock-not-linear", "clock-uncertain", "clock-drift-unknown", "clock-drift-limited"];
 
 /// Verifies the result of an earlier run on the recordings of a pipeline.
-pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result<Verification, Error> {
+pub fn verify(
+    result: &Path,
+    pipeline: &Pipeline,
+    progress: &dyn Steps,
+) -> Result<Verification, HeldOutError> {
     let past = open_model(result)?;
     let (_, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
@@ -57,7 +52,7 @@ pub fn verify(result: &Path, pipeline: &Pipeline, progress: &Progress) -> Result
     let judge = Judge::new(pipeline, &placed);
     let motions = seen.iter().zip(&samples).enumerate();
     let motions = motions.map(|(r, (seen, samples))| judge.follow(r, seen, samples));
-    let motions = motions.collect::<Result<Vec<Motion>, Error>>()?;
+    let motions = motions.collect::<Result<Vec<Motion>, HeldOutError>>()?;
     let shown = iso::Shown {
         placed: &placed,
         base: placed.base(),
@@ -143,7 +138,7 @@ struct Surroundings<'a> {
 
 impl Surroundings<'_> {
     /// The calibrated model in its place, and the dwells in theirs.
-    fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), Error> {
+    fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), HeldOutError> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
         let mut placed = place(self.past, self.result, self.pipeline, &model)?;
         let measures = Measures::of(self.pipeline, self.seen);
@@ -172,13 +167,17 @@ impl Surroundings<'_> {
         Ok((placed, observations, fitted))
     }
 
-    fn associate(&self, placed: &Placed, boards_fitted: bool) -> Result<Vec<Option<Association>>, Error> {
+    fn associate(
+        &self,
+        placed: &Placed,
+        boards_fitted: bool,
+    ) -> Result<Vec<Option<Association>>, HeldOutError> {
         let p = &placed.calibrated;
         let seen = (self.seen, &Associated::default());
         Ok(observe::associate_all(self.pipeline, self.board, &placed.model, p, boards_fitted, seen)?)
     }
 
-    fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, Error> {
+    fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, HeldOutError> {
         Ok(observe::observations(self.pipeline, self.board, self.seen, places).not_empty()?.observations)
     }
 }

@@ -1,6 +1,6 @@
 //! A calibrated model of an earlier run among the frames of other recordings.
 
-use crate::error::Error;
+use crate::error::HeldOutError;
 use armcal_config::{FramePose, Pipeline, TipMount};
 use armcal_core::{Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
@@ -23,7 +23,7 @@ pub fn place(
     result: &Path,
     pipeline: &Pipeline,
     surroundings: &Model,
-) -> Result<Placed, Error> {
+) -> Result<Placed, HeldOutError> {
     place_arms(&past.arms()?, past.session(), result, pipeline, surroundings)
 }
 
@@ -37,7 +37,7 @@ pub fn place_arms(
     origin: &Path,
     pipeline: &Pipeline,
     surroundings: &Model,
-) -> Result<Placed, Error> {
+) -> Result<Placed, HeldOutError> {
     let mut warnings = Vec::new();
     let specs = then.model.effects().iter().map(|e| e.spec.clone());
     let lasting: Vec<EffectSpec> = specs.filter(|s| lasts(s, &mut warnings)).collect();
@@ -53,7 +53,7 @@ pub fn place_arms(
             continue;
         }
         let Parameter { name, nominal: now, .. } = parameter;
-        let other = |problem| Error::Result { path: origin.to_owned(), problem };
+        let other = |problem| HeldOutError::Result { path: origin.to_owned(), problem };
         let known = then.model.index(name).ok_or_else(|| {
             other(format!(
                 "has no parameter {name}: its arm is not the one of this pipeline; name the [model] it was calibrated with"

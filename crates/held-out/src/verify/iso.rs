@@ -5,7 +5,7 @@
 //! stand for them, and what the servo leaves over does not count.
 
 use super::motion::{Motion, set_point};
-use crate::error::Error;
+use crate::error::HeldOutError;
 use armcal_core::{Dwell, DwellId, Observation, Reference, Samples};
 use armcal_iso9283::{Evidence, PathTest, Settings, TimedPose, TipPose, Visit, assess};
 use armcal_report::IsoReport;
@@ -39,7 +39,7 @@ pub struct Shown<'a> {
 
 impl Shown<'_> {
     /// Both assessments.
-    pub fn assess(&self) -> Result<IsoReport, Error> {
+    pub fn assess(&self) -> Result<IsoReport, HeldOutError> {
         let by = |values, path| assess(&self.evidence(Side { values, path }), &Settings::default());
         let commands_recorded = self.samples.iter().any(|s| s.set_points.is_some());
         let nominal = by(&self.placed.nominal, |planned| &planned.before)?;

@@ -7,7 +7,7 @@ mod recordings;
 mod sessions;
 
 pub use recordings::{Transfer, transfers};
-pub use sessions::{Asked, Carried, SessionTransfer, between};
+pub use sessions::{Asked, SessionTransfer, between};
 
 use armcal_model::EffectSpec;
 use serde::Serialize;
@@ -23,7 +23,7 @@ pub struct LeftOut {
 
 impl LeftOut {
     /// A formula of absolute time, or of the recording.
-    pub(crate) fn of_time(effect: &EffectSpec) -> LeftOut {
+    pub fn of_time(effect: &EffectSpec) -> LeftOut {
         let reason = "a formula of this session's time or recordings, which no other session has".to_owned();
         LeftOut { effect: effect.to_string(), reason }
     }

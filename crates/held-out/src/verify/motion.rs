@@ -1,6 +1,6 @@
 //! The arm between its dwells: predicted from the encoders, and planned by the set-points.
 
-use crate::error::Error;
+use crate::error::HeldOutError;
 use armcal_config::Pipeline;
 use armcal_core::{DwellId, JointSamples, Observation, Samples};
 use armcal_dwell::{ClockAlignment, Moment, track};
@@ -47,7 +47,7 @@ impl<'a> Judge<'a> {
     /// Dwells need the sensor's clock to a tenth of a second, paths to a millisecond: an arm with play lags behind its
     /// encoders, and the alignment of the nominal arm takes that for a late clock. So the clock is found again, by the
     /// calibrated model.
-    pub fn follow(&self, recording: usize, seen: &Seen, samples: &Samples) -> Result<Motion, Error> {
+    pub fn follow(&self, recording: usize, seen: &Seen, samples: &Samples) -> Result<Motion, HeldOutError> {
         let one = Recorded { recording, seen, samples, dwell: &self.pipeline.dwell };
         let (mut clock, mut moments) = (seen.clock.clone(), one.moments(seen.clock.as_ref())?);
         for _ in 0..CLOCK_ROUNDS {
@@ -146,7 +146,7 @@ struct Recorded<'a> {
 
 impl Recorded<'_> {
     /// Frames of the moving tip by this clock.
-    fn moments(&self, clock: Option<&ClockAlignment>) -> Result<Vec<Moment>, Error> {
+    fn moments(&self, clock: Option<&ClockAlignment>) -> Result<Vec<Moment>, HeldOutError> {
         let Seen { name, dwells, .. } = self.seen;
         let moments = track(self.samples, clock, dwells, self.dwell);
         Ok(moments.map_err(|source| RunError::Dwell { recording: name.clone(), source })?)

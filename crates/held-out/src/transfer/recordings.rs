@@ -1,12 +1,11 @@
 //! Does what was learnt in all recordings but one help in that one? Effect by effect.
 
-use crate::error::Error;
-use crate::progress::Progress;
+use crate::error::HeldOutError;
 use armcal_calibrate::{Calibration, HeldOut, HoldoutConfig, calibrate, compare_heldout};
 use armcal_config::Pipeline;
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model};
-use armcal_stages::with_effects;
+use armcal_stages::{Steps, with_effects};
 use serde::Serialize;
 
 /// What an effect does to the errors of recordings that its fit did not see.
@@ -46,13 +45,13 @@ pub fn transfers(
     geometry: &Model,
     (base, new): (&[EffectSpec], &[EffectSpec]),
     observations: &[Observation],
-    progress: &Progress,
-) -> Result<Vec<Transfer>, Error> {
+    progress: &dyn Steps,
+) -> Result<Vec<Transfer>, HeldOutError> {
     if pipeline.recordings.len() < 2 {
         return Ok(Vec::new());
     }
     progress.step("fitting without each recording in turn");
-    let calibrated = |without: Option<&EffectSpec>| -> Result<Calibration, Error> {
+    let calibrated = |without: Option<&EffectSpec>| -> Result<Calibration, HeldOutError> {
         let effects: Vec<EffectSpec> =
             base.iter().chain(new.iter().filter(|e| Some(*e) != without)).cloned().collect();
         let model = with_effects(pipeline, geometry, &effects, observations)?;

@@ -5,17 +5,15 @@
 //! second session; frames that nobody could know without it are, alike for every model.
 
 use super::LeftOut;
-use crate::error::Error;
-use crate::progress::Progress;
-use crate::verify::{lasts, place_arms};
+use crate::error::HeldOutError;
+use crate::past::{lasts, place_arms};
 use armcal_calibrate::{HeldOut, HoldoutConfig, calibrate, compare_errors, mean_by_dwell};
 use armcal_config::Pipeline;
 use armcal_core::{DwellId, Warning};
 use armcal_model::EffectSpec;
 use armcal_pipeline::Settled;
 use armcal_report::PastArms;
-use armcal_stages::{Fitted, with_effects};
-use armcal_stages::{frames, perceive};
+use armcal_stages::{Fitted, Steps, frames, perceive, with_effects};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -79,13 +77,13 @@ impl SessionTransfer {
 ///
 /// # Errors
 /// Pipelines that cannot be run, setups that contradict their data, sessions that share readings, arms of two kinds.
-pub fn between(asked: &Asked<'_>, progress: &Progress) -> Result<SessionTransfer, Error> {
+pub fn between(asked: &Asked<'_>, progress: &dyn Steps) -> Result<SessionTransfer, HeldOutError> {
     let (from, mut to) = (Pipeline::load(asked.from)?, Pipeline::load(asked.to)?);
     // All of it judges: none of it is fitted but frames.
     to.holdout = HoldoutConfig::None;
     let (_, chain) = frames::nominal_chain(&from)?;
     let named = asked.effects.iter().map(|word| EffectSpec::parse(word, chain.joint_names()));
-    let named: Vec<EffectSpec> = named.collect::<Result<_, _>>().map_err(Error::of_usage)?;
+    let named: Vec<EffectSpec> = named.collect::<Result<_, _>>().map_err(HeldOutError::Usage)?;
     let taught = sound(&from, progress)?;
     let judge = sound(&to, progress)?;
     let seen = taught.inputs.seen.iter().chain(&judge.inputs.seen);
@@ -104,14 +102,14 @@ pub fn between(asked: &Asked<'_>, progress: &Progress) -> Result<SessionTransfer
     let all = with(&effects)?;
     let compare = |before: &Errors, after: &Errors| {
         let held_out = compare_errors(before, after, &judge.fitted.observations, to.diagnosis.flips());
-        held_out.ok_or_else(|| Error::NothingToJudge { pipeline: to.name.clone() })
+        held_out.ok_or_else(|| HeldOutError::NothingToJudge { pipeline: to.name.clone() })
     };
-    let carried = |effect: &EffectSpec| -> Result<Carried, Error> {
+    let carried = |effect: &EffectSpec| -> Result<Carried, HeldOutError> {
         let others: Vec<EffectSpec> = effects.iter().filter(|e| *e != effect).cloned().collect();
         let held_out = compare(&with(&others)?.errors_m, &all.errors_m)?;
         Ok(Carried { effect: effect.to_string(), held_out, verdict: held_out.verdict() })
     };
-    let each: Vec<Result<Carried, Error>> = effects.par_iter().map(carried).collect();
+    let each: Vec<Result<Carried, HeldOutError>> = effects.par_iter().map(carried).collect();
     Ok(SessionTransfer {
         schema: SCHEMA,
         noise_floor_mm: Some(judge.fitted.calibration.noise_floor_m * 1e3).filter(|mm| mm.is_finite()),
@@ -126,7 +124,7 @@ pub fn between(asked: &Asked<'_>, progress: &Progress) -> Result<SessionTransfer
 }
 
 /// A session without a mistake in its setup: of another, every sentence would be about the mistake.
-fn sound(pipeline: &Pipeline, progress: &Progress) -> Result<Settled, Error> {
+fn sound(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, HeldOutError> {
     let settled = armcal_pipeline::settle(pipeline, progress)?;
     settled.refuse_mistakes()?;
     Ok(settled)
@@ -137,8 +135,8 @@ fn effects(
     named: Vec<EffectSpec>,
     from: &Pipeline,
     taught: &Settled,
-    progress: &Progress,
-) -> Result<(Vec<EffectSpec>, Vec<LeftOut>), Error> {
+    progress: &dyn Steps,
+) -> Result<(Vec<EffectSpec>, Vec<LeftOut>), HeldOutError> {
     let geometry = &taught.fitted.geometry;
     let mut all = frames::effect_specs(from, geometry)?;
     all.extend(named);
@@ -157,7 +155,7 @@ fn effects(
     Ok((lasting, left_behind))
 }
 
-/// Error at every pose of the second session [m].
+/// HeldOutError at every pose of the second session [m].
 type Errors = BTreeMap<DwellId, f64>;
 
 /// Two sessions, one teaching the other.
@@ -179,7 +177,7 @@ struct CarriedOver {
 
 impl Carrier<'_> {
     /// Calibrates the first session with these effects and looks at the second with that.
-    fn carried(&self, effects: &[EffectSpec]) -> Result<CarriedOver, Error> {
+    fn carried(&self, effects: &[EffectSpec]) -> Result<CarriedOver, HeldOutError> {
         let Fitted { geometry, observations, session, .. } = self.taught;
         let model = with_effects(self.from, geometry, effects, observations)?;
         let calibration = calibrate(&model, observations, &self.from.fit, &HoldoutConfig::None)?;
