@@ -54,18 +54,12 @@ pub enum Error {
     /// A value of an option that cannot be used.
     #[error("{option} {value}: {problem}")]
     BadOption { option: &'static str, value: String, problem: String },
-    /// A file of targets is not what it should be.
-    #[error("targets {}: {problem}", path.display())]
-    BadTargets { path: PathBuf, problem: String },
     /// No set-point.
     #[error(transparent)]
     Compensate(#[from] armcal_compensate::CompensateError),
-    /// A format that cannot hold the arm.
+    /// A result that cannot be put to use.
     #[error(transparent)]
-    Format(#[from] armcal_formats::FormatError),
-    /// Writing set-points as CSV.
-    #[error("writing the set-points as CSV: {0}")]
-    Csv(csv::Error),
+    Deploy(#[from] armcal_deploy::DeployError),
     /// A sealed scenario's pipeline switches the diagnosis off.
     #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
     NotDiagnosed,

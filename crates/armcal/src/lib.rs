@@ -6,7 +6,6 @@
 
 pub mod cli;
 pub mod commands;
-pub mod compensate;
 pub mod dispatch;
 pub mod error;
 pub mod extended;
@@ -15,7 +14,6 @@ pub mod score;
 pub mod stdout;
 pub mod threads;
 pub mod view;
-pub mod write;
 
 pub use armcal_config::Pipeline;
 pub use error::Error;

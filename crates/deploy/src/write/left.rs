@@ -1,7 +1,7 @@
 //! How far from the calibrated model a file leaves the arm, at the readings of the session.
 
 use super::Source;
-use crate::error::Error;
+use crate::error::DeployError;
 use armcal_core::{DwellId, ErrorStats, FeatureId, Observation, Reference};
 use armcal_formats::zeros::JointZeros;
 use armcal_report::{OBSERVATIONS_FILE, PastModel, PastObservations};
@@ -20,7 +20,7 @@ impl Recorded {
     ///
     /// # Errors
     /// A file of observations that cannot be read.
-    pub fn beside(result: &Path, past: &PastModel) -> Result<Recorded, Error> {
+    pub fn beside(result: &Path, past: &PastModel) -> Result<Recorded, DeployError> {
         let folder = if result.is_dir() { result } else { result.parent().unwrap_or(Path::new("")) };
         let path = folder.join(OBSERVATIONS_FILE);
         if path.is_file() {

@@ -1,6 +1,7 @@
 //! Set-points as CSV, as JSON and for the terminal.
 
 use super::suffixes;
+use crate::error::DeployError;
 use armcal_compensate::{Kind, SetPoint};
 use armcal_core::{Arrival, ErrorStats};
 use armcal_model::Chain;
@@ -36,13 +37,13 @@ pub fn errors(points: &[SetPoint]) -> [ErrorStats; 2] {
 
 impl Sheet<'_> {
     /// One row a set-point. `nominal.<joint>` and `set_point.<joint>` are SI, corrections in display units.
-    pub fn csv(&self) -> Result<Vec<u8>, csv::Error> {
+    pub fn csv(&self) -> Result<Vec<u8>, DeployError> {
         let mut out = csv::Writer::from_writer(Vec::new());
         out.write_record(self.header())?;
         for (point, at) in self.points.iter().zip(&self.in_world_m) {
             out.write_record(self.row(point, at))?;
         }
-        out.into_inner().map_err(|e| csv::Error::from(std::io::Error::other(e.to_string())))
+        Ok(out.into_inner().map_err(|e| csv::Error::from(std::io::Error::other(e.to_string())))?)
     }
 
     fn joints(&self) -> impl Iterator<Item = (usize, &String, [&'static str; 2])> {

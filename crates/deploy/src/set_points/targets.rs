@@ -4,7 +4,7 @@
 //! name, x_m, y_m, z_m            # and, where wanted: qx, qy, qz, qw, t_s
 //! ```
 
-use crate::error::Error;
+use crate::error::DeployError;
 use armcal_config::read_text;
 use armcal_recording::input::Kind;
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -41,9 +41,9 @@ struct File {
 }
 
 /// Reads and checks the file.
-pub fn read(path: &Path) -> Result<Vec<Wanted>, Error> {
+pub fn read(path: &Path) -> Result<Vec<Wanted>, DeployError> {
     let text = read_text("file of targets", Kind::Data, path)?;
-    let bad = |problem: String| Error::BadTargets { path: path.to_owned(), problem };
+    let bad = |problem: String| DeployError::BadTargets { path: path.to_owned(), problem };
     let toml = path.extension().is_some_and(|e| e == "toml");
     let parsed = if toml {
         toml::from_str::<File>(&text).map(|file| file.targets).map_err(|e| e.to_string())

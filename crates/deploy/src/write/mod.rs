@@ -4,7 +4,7 @@
 
 pub mod left;
 
-use crate::error::Error;
+use crate::error::DeployError;
 use armcal_core::{FeatureId, Pose, RollPitchYaw};
 use armcal_formats::dh::DhRows;
 use armcal_formats::ur::{UrKinematics, hash_in};
@@ -101,7 +101,7 @@ pub fn made(
     format: Format,
     hash_from: Option<&str>,
     recorded: &Recorded,
-) -> Result<Made, Error> {
+) -> Result<Made, DeployError> {
     let mut made = match format {
         Format::Urdf if source.is_urdf() => own_urdf(source)?,
         Format::Urdf => of_skeleton(source, urdf::urdf(&source.skeleton), "a link on a fixed joint"),
@@ -145,7 +145,7 @@ fn counted<'s>(what: &str, joints: impl Iterator<Item = (&'s str, &'s Moving)>) 
 }
 
 /// The URDF that the arm came from, with calibrated origins.
-fn own_urdf(source: &Source<'_>) -> Result<Made, Error> {
+fn own_urdf(source: &Source<'_>) -> Result<Made, DeployError> {
     let (arms, tip) = (source.arms, source.tip_is_calibrated());
     let (text, _) = source.past.urdf(source.arm).unwrap_or_default();
     let (text, warnings) =
@@ -162,7 +162,7 @@ fn own_urdf(source: &Source<'_>) -> Result<Made, Error> {
 }
 
 /// The same origins to be included.
-fn origins(source: &Source<'_>) -> Result<Made, Error> {
+fn origins(source: &Source<'_>) -> Result<Made, DeployError> {
     if !source.is_urdf() {
         let problem = "it came from a DH table, and there is no description whose origins it could replace; urdf makes one";
         let problem = problem.to_owned();
@@ -209,7 +209,7 @@ fn of_skeleton(source: &Source<'_>, text: String, place: &str) -> Made {
     made
 }
 
-fn ur(source: &Source<'_>, hash_from: Option<&str>) -> Result<Made, Error> {
+fn ur(source: &Source<'_>, hash_from: Option<&str>) -> Result<Made, DeployError> {
     let tip = source.tip(Format::UrYaml)?;
     let kinematics = UrKinematics::of(&source.skeleton, tip, !source.is_urdf())?;
     let hash = hash_in(hash_from.unwrap_or_default())?;
@@ -276,7 +276,7 @@ fn joint_zeros(source: &Source<'_>, recorded: &Recorded) -> Made {
     made
 }
 
-fn dh_rows(source: &Source<'_>) -> Result<Made, Error> {
+fn dh_rows(source: &Source<'_>) -> Result<Made, DeployError> {
     let tip = source.tip(Format::DhCsv)?;
     let (chain, own) = source.arms.model.chain().arm(source.arm);
     let own = chain.dh_rows(&source.arms.values[own]);

@@ -7,24 +7,23 @@ pub mod recording;
 pub mod table;
 pub mod targets;
 
-use crate::error::Error;
+use crate::error::DeployError;
 use armcal_compensate::{Target, TargetFrame};
 use armcal_core::{FeatureId, Unit};
 use armcal_report::{PastArms, PastModel};
 use nalgebra::{Point3, Vector3};
 use targets::Wanted;
 
-/// The frame of that name: `world`, `base`, or `board.<recording>`.
-pub fn target_frame(past: &PastModel, name: &str) -> Result<TargetFrame, Error> {
-    let bad = |problem: String| Error::BadOption { option: "--frame", value: name.to_owned(), problem };
+/// The frame of that name: `world`, `base`, or `board.<recording>`; what there is, otherwise.
+pub fn target_frame(past: &PastModel, name: &str) -> Result<TargetFrame, String> {
     match name {
         "world" => Ok(TargetFrame::World),
         "base" => Ok(TargetFrame::Base),
         _ => {
-            let recording = name.strip_prefix("board.").ok_or_else(|| {
-                bad("the frames are world, base, and board.RECORDING for the board of a recording".into())
-            })?;
-            recording_index(past, recording).map(TargetFrame::Board).map_err(bad)
+            let recording = name
+                .strip_prefix("board.")
+                .ok_or("the frames are world, base, and board.RECORDING for the board of a recording")?;
+            recording_index(past, recording).map(TargetFrame::Board)
         }
     }
 }
@@ -42,7 +41,7 @@ pub fn placed(
     arms: &PastArms,
     (feature, frame): (FeatureId, TargetFrame),
     wanted: &[Wanted],
-) -> Result<Vec<Target>, Error> {
+) -> Result<Vec<Target>, DeployError> {
     let place = |w: &Wanted| {
         let target = frame.target(arms, feature, &w.name, (Vector3::from(w.xyz_m), w.orientation()))?;
         Ok(Target { time_s: w.t_s, ..target })
