@@ -1,6 +1,5 @@
 //! From what a user typed to the command that does it.
 
-use crate::batch::Manifest;
 use crate::cli::{Cli, Command};
 use crate::commands::{
     Outcome, add, batch, check, compare, compensate, completions, diagnose, effects, export, extract, init,
@@ -8,7 +7,8 @@ use crate::commands::{
 };
 use crate::error::Error;
 use crate::stdout::tell;
-use crate::transfer::Asked;
+use armcal_config::Manifest;
+use armcal_held_out::Asked;
 use armcal_recording::losses;
 use armcal_report::Detail;
 use clap::CommandFactory as _;

@@ -1,5 +1,8 @@
 //! Everything that stops a command, in words that say what was being done and to what.
 
+use armcal_check::CheckError;
+use armcal_held_out::HeldOutError;
+use armcal_init::InitError;
 use armcal_stages::RunError;
 use std::path::PathBuf;
 
@@ -11,17 +14,14 @@ pub enum Error {
     #[error(transparent)]
     Run(#[from] RunError),
     /// No pipeline can be proposed.
-    #[error("{problem}")]
-    Init { problem: String },
+    #[error(transparent)]
+    Init(#[from] InitError),
     /// A name on the command line that means nothing.
     #[error(transparent)]
     Usage(Box<Error>),
-    /// What a batch should work on.
-    #[error("recordings `{what}`: {why}")]
-    Manifest { what: String, why: String },
-    /// A file in a campaign's folder that is not what it should be.
-    #[error("campaign {}: {why}", path.display())]
-    Campaign { path: PathBuf, why: String },
+    /// A whole archive.
+    #[error(transparent)]
+    Archive(#[from] armcal_archive::ArchiveError),
     /// A share that is none.
     #[error("--shard: {0}")]
     Shard(String),
@@ -31,9 +31,6 @@ pub enum Error {
     /// The system gives no threads.
     #[error("starting worker threads: {why}")]
     Threads { why: String },
-    /// A defect of armcal itself.
-    #[error("recording `{recording}`: armcal itself failed ({why}); please report it with the recording")]
-    Internal { recording: String, why: String },
     /// Writing results.
     #[error(transparent)]
     Report(#[from] armcal_report::ReportError),
@@ -54,30 +51,21 @@ pub enum Error {
     /// A result of an earlier run that cannot be used here, or a folder without any.
     #[error("{} {problem}", path.display())]
     Result { path: PathBuf, problem: String },
-    /// Judging by ISO 9283.
-    #[error("judging by ISO 9283: {0}")]
-    Iso(#[from] armcal_iso9283::IsoError),
     /// A value of an option that cannot be used.
     #[error("{option} {value}: {problem}")]
     BadOption { option: &'static str, value: String, problem: String },
-    /// A file of targets is not what it should be.
-    #[error("targets {}: {problem}", path.display())]
-    BadTargets { path: PathBuf, problem: String },
     /// No set-point.
     #[error(transparent)]
     Compensate(#[from] armcal_compensate::CompensateError),
-    /// A format that cannot hold the arm.
+    /// A result that cannot be put to use.
     #[error(transparent)]
-    Format(#[from] armcal_formats::FormatError),
-    /// Writing set-points as CSV.
-    #[error("writing the set-points as CSV: {0}")]
-    Csv(csv::Error),
+    Deploy(#[from] armcal_deploy::DeployError),
     /// A sealed scenario's pipeline switches the diagnosis off.
     #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
     NotDiagnosed,
-    /// `armcal transfer` to a session that shows nothing.
-    #[error("no dwell of `{pipeline}` has a place that anything could be judged by; see `armcal run` of it")]
-    NothingToJudge { pipeline: String },
+    /// A model that cannot be judged on other recordings.
+    #[error(transparent)]
+    HeldOut(#[from] HeldOutError),
     /// `armcal add suggested` where nothing is, or nothing that holds elsewhere.
     #[error(
         "the diagnosis of `{pipeline}` suggests no effect{}; name one (see `armcal effects`)",
@@ -96,22 +84,12 @@ pub enum Error {
     /// A folder for results cannot be made.
     #[error("making the folder {}: {source}", path.display())]
     Folder { path: PathBuf, source: std::io::Error },
-    /// `armcal check` of a pipeline that limits nothing.
-    #[error(
-        "pipeline {}: there is no limit to check; add a [check] section, for instance `max_over_floor = 1.5`, \
-         `max_holdout_mean_mm = 0.5` and `verdicts = [\"nothing_missing\"]` (docs/check.md lists them)",
-        path.display()
-    )]
-    NoLimits { path: PathBuf },
-    /// What `[check]` compares with is not a result.
-    #[error(
-        "check.reference: {} {problem}; name the summary.json, run.mcap or folder of an accepted `armcal run`",
-        path.display()
-    )]
-    BadReference { path: PathBuf, problem: String },
-    /// Writing JUnit XML.
-    #[error("writing the checks as JUnit XML: {0}")]
-    Junit(Box<dyn std::error::Error + Send + Sync>),
+    /// Results that cannot be pooled.
+    #[error(transparent)]
+    Pool(#[from] armcal_pipeline::PoolError),
+    /// Limits that cannot be judged by.
+    #[error(transparent)]
+    Check(#[from] CheckError),
     /// Reporting a failure failed too.
     #[error("{first}; and {second}")]
     Also { first: Box<Error>, second: Box<Error> },
@@ -129,17 +107,8 @@ pub enum Error {
     Stdout(std::io::Error),
 }
 
-/// What may stop a run stops a command.
-macro_rules! of_run {
-    ($($source:ty),*) => {$(
-        impl From<$source> for Error {
-            fn from(source: $source) -> Error {
-                Error::Run(source.into())
-            }
-        }
-    )*};
-}
-of_run!(
+armcal_stages::stopped_as_run!(
+    Error:
     armcal_config::ConfigError,
     armcal_table::TableError,
     armcal_model::ModelError,
@@ -164,8 +133,10 @@ impl Error {
     /// What the program exits with: 2 where the user asked for something that cannot be, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Error::NoLimits { .. }
+            Error::Check(CheckError::NoLimits { .. })
             | Error::Usage(_)
+            | Error::Init(InitError::Usage { .. })
+            | Error::HeldOut(HeldOutError::Usage(_))
             | Error::BadOption { .. }
             | Error::Shard(_)
             | Error::NoPipeline => 2,

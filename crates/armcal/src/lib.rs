@@ -4,25 +4,16 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
-pub mod batch;
-pub mod check;
 pub mod cli;
 pub mod commands;
-pub mod compensate;
 pub mod dispatch;
 pub mod error;
 pub mod extended;
-pub mod init;
-pub mod plan;
-pub mod pool;
 pub mod progress;
 pub mod score;
 pub mod stdout;
 pub mod threads;
-pub mod transfer;
-pub mod verify;
 pub mod view;
-pub mod write;
 
 pub use armcal_config::Pipeline;
 pub use error::Error;

@@ -1,5 +1,6 @@
 //! What is being done now, on stderr, when somebody watches.
 
+use armcal_archive::Counter;
 use armcal_core::printable;
 use armcal_stages::Steps;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -35,27 +36,6 @@ impl Progress {
         self.bar.set_message(what.to_owned());
     }
 
-    /// From now on so many recordings are counted, with their rate and the time left.
-    pub fn count(&self, recordings: usize) {
-        self.bar.set_length(recordings as u64);
-        let shown = "{bar:30} {pos}/{len} recordings, {per_sec}, {eta} left  {msg}";
-        if let Ok(style) = ProgressStyle::with_template(shown) {
-            self.bar.set_style(style);
-        }
-    }
-
-    /// One of them is done.
-    pub fn advance(&self, name: &str) {
-        self.bar.set_message(name.to_owned());
-        self.bar.inc(1);
-    }
-
-    /// Tells something at once, above the line.
-    pub fn say(&self, text: &str) {
-        // A closed stderr leaves nowhere to tell it; results will.
-        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{}", printable(text))));
-    }
-
     /// Removes the line.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
@@ -65,6 +45,28 @@ impl Progress {
 impl Steps for Progress {
     fn step(&self, what: &str) {
         Progress::step(self, what);
+    }
+}
+
+impl Counter for Progress {
+    /// With their rate and the time left.
+    fn count(&self, recordings: usize) {
+        self.bar.set_length(recordings as u64);
+        let shown = "{bar:30} {pos}/{len} recordings, {per_sec}, {eta} left  {msg}";
+        if let Ok(style) = ProgressStyle::with_template(shown) {
+            self.bar.set_style(style);
+        }
+    }
+
+    fn advance(&self, name: &str) {
+        self.bar.set_message(name.to_owned());
+        self.bar.inc(1);
+    }
+
+    /// Above the line.
+    fn say(&self, text: &str) {
+        // A closed stderr leaves nowhere to tell it; results will.
+        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{}", printable(text))));
     }
 }
 

@@ -39,10 +39,6 @@ pub fn start() -> Result<(), Error> {
 /// As many as rayon would start.
 fn wanted() -> usize {
     let told = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse::<usize>().ok());
-    told.filter(|threads| *threads > 0).unwrap_or_else(cores)
-}
-
-/// Cores of this machine that the process may use.
-pub(crate) fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+    told.filter(|threads| *threads > 0)
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }

@@ -20,6 +20,9 @@ pub enum ConfigError {
     /// The pipeline file is not what it should be.
     #[error("pipeline {}: {source}", path.display())]
     Syntax { path: PathBuf, source: Box<toml::de::Error> },
+    /// What was named as recordings and is not.
+    #[error("recordings `{what}`: {why}")]
+    Recordings { what: String, why: String },
     /// Two parts of the pipeline contradict each other.
     #[error("pipeline {}: `{key}` {problem}", path.display())]
     Contradiction { path: PathBuf, key: String, problem: String },

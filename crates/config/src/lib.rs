@@ -1,8 +1,8 @@
 //! The pipeline file: one TOML a rig or purpose, its sections in the order of the story.
 //!
 //! [`Pipeline::load`] reads one and holds its sections against each other; paths inside are relative to the file. Sections that one
-//! step alone acts on belong to the crate of that step; all others are here, a file each. Nothing here reads a recording or
-//! calculates.
+//! step alone acts on belong to the crate of that step; all others are here, a file each. A [`Manifest`] names
+//! the recordings of an archive instead. Nothing here reads a recording or calculates.
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
@@ -15,12 +15,14 @@ mod frames;
 mod load;
 mod load_two_arms;
 mod loads;
+mod manifest;
 mod markers;
 mod measured;
 mod measures;
 mod model;
 mod observations;
 mod output;
+mod pattern;
 mod pipeline;
 mod points;
 mod pool;
@@ -36,6 +38,7 @@ pub use closed_chain::{ClosedChainSection, ClosureKind};
 pub use error::ConfigError;
 pub use frames::{FramePose, FrameSection, FramesSection, SensorSection, Vertical, measured};
 pub use loads::LoadEntry;
+pub use manifest::{Manifest, recordings_below};
 pub use markers::MarkerSection;
 pub use measures::{Measure, MeasureKind, MeasureSection};
 pub use model::{ModelSection, ParameterOverride};

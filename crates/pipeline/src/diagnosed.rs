@@ -10,7 +10,7 @@ use armcal_stages::{RunError, Steps};
 pub(crate) const DIAGNOSIS_FAILED: &str = "diagnosis-failed";
 
 /// Looks for the effect that the model of a run is missing, if the pipeline wants to know.
-pub fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) {
+pub(crate) fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) {
     let found = diagnosis(pipeline, &calibrated(run, pipeline), progress);
     set_diagnosis(run, found);
 }

@@ -174,7 +174,7 @@ impl Settled {
 }
 
 /// A run of these observations, and nothing else of it.
-pub fn run_of(
+pub(crate) fn run_of(
     pipeline: &Pipeline,
     model_texts: Vec<String>,
     model: Model,

@@ -75,6 +75,18 @@ pub enum RunError {
     SetupFirst { pipeline: String, code: String, message: String },
 }
 
+/// Makes the errors of the steps of a run those of what leans on runs, by way of its `From<RunError>`.
+#[macro_export]
+macro_rules! stopped_as_run {
+    ($error:ident: $($source:ty),+ $(,)?) => {$(
+        impl From<$source> for $error {
+            fn from(source: $source) -> Self {
+                $crate::RunError::from(source).into()
+            }
+        }
+    )+};
+}
+
 impl RunError {
     /// The same about a file that is not there, with what the pipeline says about where its data come from.
     pub fn where_data_come_from(self, pipeline: &Pipeline) -> RunError {

@@ -1,10 +1,10 @@
 //! `armcal batch`, `armcal map`, `armcal reduce`: a whole archive, on one machine or many.
 
 use super::{Outcome, may_write, print, style};
-use crate::batch::{self, Manifest, Request, Shard, receipt_file};
 use crate::error::Error;
 use crate::progress::Progress;
-use armcal_config::Pipeline;
+use armcal_archive::{Counter as _, Request, Shard, batch, receipt_file};
+use armcal_config::{Manifest, Pipeline};
 use armcal_recording::input;
 use armcal_report::{Campaign, campaign_files, campaign_json, campaign_text};
 use armcal_result::Status;
@@ -42,7 +42,7 @@ pub(crate) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
     job.note_inputs();
     may_write(campaign_files(job.out))?;
     let progress = Progress::new();
-    let (campaign, written, skipped) = batch::batch(&job.request(&pipeline), &progress)?;
+    let (campaign, written, skipped) = batch(&job.request(&pipeline), &progress)?;
     progress.finish();
     if skipped > 0 {
         progress.say(&format!("{skipped} results were there already"));
@@ -57,7 +57,7 @@ pub(crate) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> 
     job.note_inputs();
     may_write([receipt_file(shard, job.out)])?;
     let progress = Progress::new();
-    let receipt = batch::map(&job.request(&pipeline), shard, &progress)?;
+    let receipt = armcal_archive::map(&job.request(&pipeline), shard, &progress)?;
     progress.finish();
     let (all, failed, skipped) = (receipt.done.len(), receipt.failed(), receipt.skipped);
     print(&format!("share {shard}: {all} recordings, {failed} failed, {skipped} were there already\n"))?;
@@ -76,7 +76,7 @@ fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
 /// The shares together.
 pub(crate) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
     may_write(campaign_files(out))?;
-    let (campaign, written) = batch::reduce(out)?;
+    let (campaign, written) = armcal_archive::reduce(out)?;
     show(&campaign, out, &written, json)
 }
 

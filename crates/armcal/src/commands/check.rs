@@ -2,10 +2,10 @@
 
 use super::run::results;
 use super::{Outcome, may_write, print};
-use crate::check::{Judged, Judgement, Limits, SCHEMA, judge, junit, markdown, text};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::view::{self, Given};
+use armcal_check::{Judged, Judgement, Limits, SCHEMA, judge, junit, markdown, text};
 use armcal_config::Pipeline;
 use armcal_core::printable;
 use armcal_recording::atomic;
@@ -43,7 +43,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     may_write([&request.junit, &request.markdown].into_iter().flatten())?;
     match loaded.and_then(|(pipeline, given)| judged(request, &pipeline, given)) {
         Ok(judged) => {
-            write(&request.junit, || junit::junit(&judged))?;
+            write(&request.junit, || Ok(junit::junit(&judged)?))?;
             write(&request.markdown, || Ok(markdown::markdown(&judged)))?;
             print(&if request.json { super::json_text(&judged)? } else { text::text(&judged) })?;
             Ok(match judged.judgement {
@@ -80,7 +80,7 @@ fn judged(request: &Request, pipeline: &Pipeline, given: Given) -> Result<Judged
 fn report_failure(request: &Request, error: &Error) -> Result<(), Error> {
     let name = request.pipeline.file_stem().unwrap_or_default().to_string_lossy();
     let error = error.to_string();
-    write(&request.junit, || junit::junit_failed(&name, &error))?;
+    write(&request.junit, || Ok(junit::junit_failed(&name, &error)?))?;
     write(&request.markdown, || Ok(markdown::markdown_failed(&name, &error)))?;
     let line = format!("{}: no check was made, the run failed", printable(&name));
     if request.json {

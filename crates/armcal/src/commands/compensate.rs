@@ -1,11 +1,11 @@
 //! `armcal compensate`: set-points that bring the calibrated arm to Cartesian targets.
 
 use super::{Outcome, joint_range, may_write, print};
-use crate::compensate::table::Sheet;
-use crate::compensate::{in_world_m, placed, recording, recording_index, target_frame, targets};
 use crate::error::Error;
 use armcal_compensate::{Compensator, Drive, SetPoint, TargetFrame, resample};
 use armcal_core::{FeatureId, Load};
+use armcal_deploy::set_points::table::Sheet;
+use armcal_deploy::set_points::{in_world_m, placed, recording, recording_index, target_frame, targets};
 use armcal_model::Model;
 use armcal_recording::atomic;
 use armcal_result::{PastArms, PastModel, open_model};
@@ -67,7 +67,8 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let past = open_model(&request.result)?;
     let arms = past.arms()?;
     let tip = tip(&arms.geometry, request.tip.as_deref())?;
-    let frame = target_frame(&past, &request.frame)?;
+    let frame = target_frame(&past, &request.frame)
+        .map_err(|problem| bad("--frame", request.frame.clone(), &problem))?;
     let wanted = targets::read(&request.targets)?;
     may_write([Some(&request.out), request.mcap.as_ref()].into_iter().flatten())?;
     let start = request.start.as_deref().map(|words| joints(words, &arms)).transpose()?;
@@ -94,7 +95,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         in_world_m,
         notes: notes(&past, &arms, (frame, held.as_slice()), &compensator.conditions),
     };
-    atomic::write(&request.out, &sheet.csv().map_err(Error::Csv)?).map_err(Error::Output)?;
+    atomic::write(&request.out, &sheet.csv()?).map_err(Error::Output)?;
     if let Some(path) = &request.mcap {
         recording::write(path, chain.joint_names(), &points).map_err(Error::Output)?;
     }

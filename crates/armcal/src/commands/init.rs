@@ -2,9 +2,9 @@
 
 use super::{Outcome, json_text, print};
 use crate::error::Error;
-use crate::init::{Asked, Proposal, Told, propose};
 use crate::progress::Progress;
 use armcal_core::printable;
+use armcal_init::{Asked, Proposal, Told, propose};
 use armcal_recording::{Over, RecordingError, atomic, holds, input, may_put, may_write_over};
 use clap::Args;
 use serde_json::{Value, json};
@@ -71,7 +71,9 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         points: request.points.clone(),
         out: request.out.clone(),
     };
-    let proposal = propose(&asked, &Progress::new())?;
+    let progress = Progress::new();
+    let proposal = propose(&asked, &progress)?;
+    progress.finish();
     // What is there already, word for word, stays: a robot's description has no mark of armcal's.
     let is_new = |(path, text): &&(PathBuf, String)| !holds(path, text.as_bytes());
     let beside: Vec<&(PathBuf, String)> = proposal.beside.iter().filter(is_new).collect();

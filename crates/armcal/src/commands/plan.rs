@@ -2,7 +2,6 @@
 
 use super::{Outcome, joint_range, print};
 use crate::error::Error;
-use crate::plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
 use crate::progress::Progress;
 use crate::view::Given;
 use armcal_calibrate::{HoldoutConfig, calibrate};
@@ -10,6 +9,7 @@ use armcal_config::Pipeline;
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
 use armcal_pipeline::Settled;
+use armcal_plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
 use armcal_report::{number, plain_table, table_text};
 use armcal_stages::{Fitted, frames};
 use clap::Args;

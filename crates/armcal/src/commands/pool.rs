@@ -3,7 +3,7 @@
 use super::{Outcome, may_write, print, print_written, style};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::{pool, view};
+use crate::view;
 use armcal_config::Pipeline;
 use armcal_config::{InputMessages, OutputConfig};
 use armcal_report::{Detail, pool_files, pool_json, terminal, write_all};
@@ -23,7 +23,7 @@ pub fn run(
     files.push(out.join(view::SOURCE_FILE));
     may_write(files)?;
     let progress = Progress::new();
-    let run = pool::run(&pipeline, results, &progress)?.run;
+    let run = armcal_pipeline::pool(&pipeline, results, &progress)?.run;
     progress.step("writing results");
     // The recordings themselves are not at hand.
     let written = write_all(&run, &[], out, &OutputConfig { input: InputMessages::Reference })?;

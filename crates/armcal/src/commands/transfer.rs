@@ -3,8 +3,8 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::transfer::{Asked, SessionTransfer, between};
 use armcal_calibrate::HeldOut;
+use armcal_held_out::{Asked, SessionTransfer, between};
 use armcal_report::{number, plain_table, table_text};
 use comfy_table::Cell;
 

@@ -3,8 +3,8 @@
 use super::{Outcome, may_write, print, style};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::verify::verify;
 use armcal_config::Pipeline;
+use armcal_held_out::verify;
 use armcal_recording::{atomic, make_folder};
 use armcal_report::{verification_files, verification_json, verification_paths, verification_text};
 use armcal_result::Status;

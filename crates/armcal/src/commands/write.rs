@@ -2,12 +2,12 @@
 
 use super::{Outcome, may_write, print};
 use crate::error::Error;
-use crate::write::left::{Recorded, left};
-use crate::write::{Made, Source, made};
 use armcal_config::read_text;
 use armcal_core::ErrorStats;
 use armcal_core::printable;
 use armcal_core::units::millimetres;
+use armcal_deploy::write::left::{Recorded, left};
+use armcal_deploy::write::{Made, Source, made};
 use armcal_formats::Format;
 use armcal_recording::atomic;
 use armcal_recording::input::Kind;

@@ -4,12 +4,12 @@ use super::requests::{Choices, Wanted};
 use super::source::Given;
 use crate::error::Error;
 use crate::extended::extend;
-use crate::pool::{self, Pooled};
 use crate::progress::Progress;
 use armcal_calibrate::{FitConfig, HoldoutConfig, Stop, calibrate};
 use armcal_config::Pipeline;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, Model, catalogue};
+use armcal_pipeline::Pooled;
 use armcal_recording::atomic;
 use armcal_report::{PageKind, refit_json, report_html};
 use armcal_result::levers::Basis;
@@ -45,7 +45,7 @@ impl Bench {
             }
             results => {
                 let pipeline = Pipeline::load_for_others(&path)?;
-                let Pooled { run, geometry } = pool::run(&pipeline, results, progress)?;
+                let Pooled { run, geometry } = armcal_pipeline::pool(&pipeline, results, progress)?;
                 (pipeline, geometry, run)
             }
         };

@@ -2,9 +2,9 @@
 //!
 //! None of these may panic or hang; what a reader accepts must also survive what is done with it first.
 
-use armcal::Pipeline;
-use armcal::check::reference::Calibrated;
-use armcal::compensate::targets;
+use armcal_check::reference::Calibrated;
+use armcal_config::Pipeline;
+use armcal_deploy::set_points::targets;
 use armcal_lab::LabConfig;
 use armcal_lab::pair::PairConfig;
 use armcal_model::{Chain, EffectSpec, EffectTable, Frames, Model, Session};

@@ -1,0 +1,131 @@
+//! A lab's whole archive: every recording calibrated by itself, and what they say together.
+//!
+//! `Manifest -> Key of each recording -> Store (skip what is there) -> Work -> Row -> Campaign`
+//!
+//! Results are named by what they were made from, and appear whole or not at all: a batch that is killed goes on where it
+//! was. [`map`] does a share of a manifest, on any machine that sees the folder, [`reduce`] puts the shares together; a
+//! batch is one share and its reduction, so all three ways give the same bytes.
+
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
+mod counter;
+mod error;
+mod key;
+mod memory;
+mod once;
+mod shard;
+mod store;
+mod work;
+mod workers;
+
+pub use counter::Counter;
+pub use error::ArchiveError;
+pub use shard::{Receipt, Shard};
+
+use armcal_config::{Manifest, Pipeline};
+use armcal_report::{Campaign, FailedRecording, write_campaign};
+use key::Keys;
+use shard::Done;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use store::Store;
+
+/// What to work on, and how.
+pub struct Request<'a> {
+    /// The recordings.
+    pub manifest: &'a Manifest,
+    /// What is done to each; its own recordings do not count.
+    pub pipeline: &'a Pipeline,
+    /// Folder of the campaign.
+    pub out: &'a Path,
+    /// Whether each recording gets everything that `armcal run` writes.
+    pub full: bool,
+    /// Recordings worked on at a time; all cores when absent.
+    pub jobs: Option<usize>,
+}
+
+/// Works on every recording and puts them together. Returns what they say, the written files, and how many results were
+/// there already.
+pub fn batch(
+    request: &Request<'_>,
+    counter: &dyn Counter,
+) -> Result<(Campaign, Vec<PathBuf>, usize), ArchiveError> {
+    let receipt = work_on(request, Shard::WHOLE, counter)?;
+    let skipped = receipt.skipped;
+    let (campaign, written) = put_together(vec![receipt], request.out)?;
+    Ok((campaign, written, skipped))
+}
+
+/// Works on one share of the manifest, and leaves a receipt for [`reduce`].
+pub fn map(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
+    let receipt = work_on(request, shard, counter)?;
+    receipt.write(request.out)?;
+    Ok(receipt)
+}
+
+/// The receipt that [`map`] leaves of a share.
+pub fn receipt_file(shard: Shard, out: &Path) -> PathBuf {
+    Receipt::file(shard, out)
+}
+
+/// Puts the shares of a folder together.
+///
+/// # Errors
+/// Shares that are missing, doubled, or not of one manifest and pipeline; each by its name.
+pub fn reduce(out: &Path) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
+    put_together(shard::receipts(out)?, out)
+}
+
+fn work_on(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
+    let Request { manifest, pipeline, out, .. } = request;
+    memory::keep_little();
+    let store = Store::open(out)?;
+    let keys = Keys::new(pipeline, request.full, out)?;
+    let own: Vec<usize> = (0..manifest.entries.len()).filter(|i| shard.has(*i)).collect();
+    counter.count(own.len());
+    let jobs = request.jobs.unwrap_or_else(workers::cores);
+    let done = workers::each(own.len(), jobs, |i| {
+        let index = own[i];
+        let entry = &manifest.entries[index];
+        let (done, skipped) = match work::one(pipeline, entry, &keys, &store, request.full) {
+            Ok((folder, skipped)) => (Done::Calibrated { index, folder }, skipped),
+            Err(e) => {
+                let failed = FailedRecording { why: e.to_string(), ..work::named(entry) };
+                counter.say(&format!("failed: {}: {}", failed.recording, failed.why));
+                (Done::Failed { index, failed }, false)
+            }
+        };
+        counter.advance(&entry.name());
+        if (i + 1) % memory::EVERY == 0 {
+            memory::give_back();
+        }
+        (done, skipped)
+    });
+    let skipped = done.iter().filter(|(_, skipped)| *skipped).count();
+    let done = done.into_iter().map(|(done, _)| done).collect();
+    let campaign = keys.of_campaign(manifest);
+    Ok(Receipt::new(shard, campaign, &pipeline.name, manifest.entries.len(), done, skipped))
+}
+
+fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
+    let (pipeline, done) = shard::together(receipts, out)?;
+    let store = Store::open(out)?;
+    let (mut rows, mut folders, mut failed) = (Vec::new(), Vec::new(), Vec::new());
+    let mut names = BTreeSet::new();
+    for one in done {
+        match one {
+            Done::Calibrated { folder, .. } => {
+                let mut row = store.row(&folder)?;
+                row.share_names(&mut names);
+                rows.push(row);
+                folders.push(folder);
+            }
+            Done::Failed { failed: one, .. } => failed.push(one),
+        }
+    }
+    let repeats = once::repeats(&store, &rows, &folders)?;
+    let results = rows.into_iter().zip(folders.iter().map(|folder| store::relative(folder))).collect();
+    let campaign = Campaign::of(&pipeline, results, failed, repeats);
+    let written = write_campaign(&campaign, out)?;
+    Ok((campaign, written))
+}

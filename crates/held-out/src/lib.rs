@@ -1,0 +1,16 @@
+//! A calibrated model on recordings that were held out of its calibration.
+//!
+//! [`verify`] compares the result of an earlier run with new recordings, in points, paths and by ISO 9283; [`transfers`] and
+//! [`between`] ask of every effect whether what it learnt in some recordings, or in another session, lowers the error in others.
+//! `past` puts an arm that was calibrated elsewhere among the frames of here. What is told of it all is in `report`.
+
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
+mod error;
+mod past;
+mod transfer;
+mod verify;
+
+pub use error::HeldOutError;
+pub use transfer::{Asked, LeftOut, SessionTransfer, Transfer, between, transfers};
+pub use verify::verify;

@@ -1,0 +1,526 @@
+//! The nominal arm: which of its joints are recorded, from which link to which.
+
+use super::channels::{Channels, JointTopic};
+use super::fields::Field;
+use crate::error::InitError;
+use armcal_core::Pose;
+use armcal_model::{Chain, Model, check_xml};
+use armcal_recording::input::Kind;
+use armcal_stages::frames::bare;
+use roxmltree::{Document, Node};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Names that REP-105 keeps for what is no part of a robot.
+const NO_ROBOT: [&str; 4] = ["world", "map", "odom", "earth"];
+
+/// What the user says of the arm.
+#[derive(Debug, Clone, Default)]
+pub struct Told {
+    /// DH file.
+    pub dh: Option<PathBuf>,
+    /// URDF file.
+    pub urdf: Option<PathBuf>,
+    /// First link.
+    pub base_link: Option<String>,
+    /// Last link.
+    pub tip_link: Option<String>,
+    /// Topic of the joint readings.
+    pub joints: Option<String>,
+}
+
+/// The arm as far as files and names say it.
+pub struct Arm {
+    /// Its file: that of the user, or where a description from the recording will be written.
+    pub file: PathBuf,
+    /// The text of that file.
+    pub text: String,
+    /// Whether the text was found in a recording and is still to be written.
+    pub recorded: bool,
+    /// First link, of a URDF.
+    pub base_link: Option<String>,
+    /// Links that the tip may be, all behind the last joint; the first is the likeliest. Of a DH table none.
+    pub tips: Vec<String>,
+    /// The joint readings.
+    pub source: JointTopic,
+    /// Joint names as recorded, in the order of the model.
+    pub names: Vec<String>,
+    /// Every link of the URDF.
+    pub links: BTreeSet<String>,
+    /// The chain to the first of the tips.
+    pub model: Model,
+    /// Of each joint, the link or row that it moves.
+    pub carried: Vec<String>,
+    /// What was taken on trust.
+    pub unsure: Vec<String>,
+}
+
+impl Arm {
+    /// Whether it is a URDF.
+    pub fn is_urdf(&self) -> bool {
+        self.model.chain().is_urdf()
+    }
+
+    /// The same arm with the tip at another link.
+    pub fn model_to(&self, tip: &str) -> Result<Model, InitError> {
+        let base = self.base_link.as_deref().unwrap_or_default();
+        Ok(bare(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())?)
+    }
+
+    /// The links that the tip may be, of a URDF, with their places on the first of them. They are fixed to each other, so all of
+    /// them are read at once, and put where they are in any posture.
+    pub fn tip_places(&self) -> Result<Vec<(Option<String>, Pose)>, InitError> {
+        let Some((first, others)) = self.tips.split_first() else {
+            return Ok(vec![(None, Pose::identity())]);
+        };
+        let base = self.base_link.as_deref().unwrap_or_default();
+        let others: Vec<&str> = others.iter().map(String::as_str).collect();
+        let chain = Chain::from_urdf_branches(&self.text, base, first, &others, &self.file)?;
+        let (model, zeros) = (bare(&chain, Vec::new())?, vec![0.0; chain.joint_names().len()]);
+        let frames = model.link_frames(&model.nominal(), &zeros);
+        let in_base: BTreeMap<&str, Pose> = frames.iter().map(|f| (f.name.as_str(), f.in_base)).collect();
+        let first = in_base.get(first.as_str()).map_or(Pose::identity(), Pose::inverse);
+        let place = |tip: &String| Some((Some(tip.clone()), first * in_base.get(tip.as_str())?));
+        Ok(self.tips.iter().filter_map(place).collect())
+    }
+
+    /// The links that the joints carry, then the tip, in the base.
+    pub fn poses(&self, joint_rad: &[f64]) -> Vec<Pose> {
+        let p = self.model.nominal();
+        let frames = self.model.link_frames(&p, joint_rad);
+        let of =
+            |name: &String| frames.iter().find(|f| f.name == *name).map_or(Pose::identity(), |f| f.in_base);
+        self.carried.iter().map(of).chain([self.model.tip_in_base(&p, joint_rad)]).collect()
+    }
+}
+
+/// Finds the arm: a file that the user names, or the description in the recordings, which goes `beside`, or the only one in
+/// their `folders`. Joint readings of a known type come before fields with names, and these before fields without.
+pub fn find(
+    told: &Told,
+    channels: &Channels,
+    folders: &BTreeSet<PathBuf>,
+    beside: &Path,
+) -> Result<Arm, InitError> {
+    if let Some(asked) = &told.joints
+        && !channels.joints.iter().any(|j| is_called(j, asked))
+    {
+        let present: Vec<String> = channels.joints.iter().map(JointTopic::shown).collect();
+        let problem = format!(
+            "--joints {asked} is no topic of joint readings in all recordings; there are: {}",
+            present.join(", ")
+        );
+        return Err(InitError::Usage { problem });
+    }
+    let unnamed = |j: &JointTopic| {
+        let field = j.field.clone().map(|f| Field { name: None, ..f });
+        JointTopic { names: Vec::new(), field, ..j.clone() }
+    };
+    let all = || channels.joints.iter();
+    let ways: [Vec<JointTopic>; 3] = [
+        all().filter(|j| j.field.is_none()).cloned().collect(),
+        all().filter(|j| j.field.is_some() && !j.names.is_empty()).cloned().collect(),
+        all().filter(|j| j.field.is_some()).map(unnamed).collect(),
+    ];
+    let mut refused = None;
+    for joints in ways.into_iter().filter(|way| !way.is_empty()) {
+        let way = Channels { joints, urdfs: channels.urdfs.clone(), ..Channels::default() };
+        match found(told, &way, folders, beside) {
+            Ok(mut arm) => {
+                arm.unsure.extend(rivals(&arm.source, channels));
+                return Ok(arm);
+            }
+            Err(error) => _ = refused.get_or_insert(error),
+        }
+    }
+    Err(refused.unwrap_or_else(|| no_arm(channels, "no joint is recorded")))
+}
+
+/// The other fields that the joints may be in.
+fn rivals(own: &JointTopic, channels: &Channels) -> Option<String> {
+    let Field { values, why, .. } = own.field.as_ref()?;
+    let as_many =
+        |j: &&JointTopic| j.field.as_ref().is_some_and(|f| f.values == *values) && j.shown() != own.shown();
+    let others: Vec<String> = channels.joints.iter().filter(as_many).map(JointTopic::shown).collect();
+    let said = format!(
+        "the joints are at {}: {why}; --joints chooses another of {}",
+        own.shown(),
+        others.join(", ")
+    );
+    (!others.is_empty()).then_some(said)
+}
+
+fn is_called(joints: &JointTopic, asked: &str) -> bool {
+    joints.topic == asked || joints.shown() == asked
+}
+
+/// The URDF files beside the recordings.
+fn urdfs_in(folders: &BTreeSet<PathBuf>) -> Vec<PathBuf> {
+    let files =
+        folders.iter().filter_map(|f| std::fs::read_dir(f).ok()).flatten().flatten().map(|e| e.path());
+    let mut found: Vec<PathBuf> = files.filter(|p| p.extension().is_some_and(|e| e == "urdf")).collect();
+    found.sort();
+    found
+}
+
+fn found(
+    told: &Told,
+    channels: &Channels,
+    folders: &BTreeSet<PathBuf>,
+    beside: &Path,
+) -> Result<Arm, InitError> {
+    if let Some(path) = &told.dh {
+        return from_dh(told, channels, path);
+    }
+    let read = |path: &Path| armcal_config::read_text("URDF", Kind::Text, path);
+    let (file, text, recorded) = match (&told.urdf, channels.urdfs.len()) {
+        (Some(path), _) => (path.clone(), read(path)?, false),
+        (None, 1) => (beside.to_owned(), channels.urdfs.iter().next().cloned().unwrap_or_default(), true),
+        (None, 0) => match urdfs_in(folders).as_slice() {
+            [only] => (only.clone(), read(only)?, false),
+            several => {
+                let said = "no /robot_description (std_msgs/String) is recorded";
+                let lie = several.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
+                let lie = if lie.is_empty() { lie } else { format!(", and beside the recordings lie {lie}") };
+                return Err(no_arm(channels, &format!("{said}{lie}")));
+            }
+        },
+        (None, n) => {
+            return Err(no_arm(
+                channels,
+                &format!("{n} different robot descriptions are recorded; write the right one to a file"),
+            ));
+        }
+    };
+    from_urdf(told, channels, file, text, recorded)
+}
+
+fn no_arm(channels: &Channels, why: &str) -> InitError {
+    let names = channels.joints.iter().map(|j| format!("{} ({})", j.shown(), said(j)));
+    let problem = format!(
+        "nothing says what the arm is: {why}; give --urdf FILE or --dh FILE (docs/guide.md shows one). Recorded joints: {}",
+        names.collect::<Vec<_>>().join("; ")
+    );
+    InitError::Init { problem }
+}
+
+/// The joints of a topic in words.
+fn said(joints: &JointTopic) -> String {
+    match &joints.field {
+        Some(field) if joints.names.is_empty() => format!("{} numbers", field.values),
+        _ => joints.names.join(", "),
+    }
+}
+
+fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, InitError> {
+    let text = armcal_config::read_text("DH model", Kind::Text, path)?;
+    if text.trim_start().starts_with('<') {
+        let problem = format!("{} is XML and no DH table: a URDF is given with --urdf", path.display());
+        return Err(InitError::Init { problem });
+    }
+    let chain = Chain::from_dh_toml(&text, path)?;
+    let rows = chain.joint_names().to_vec();
+    let mut unsure = Vec::new();
+    let (source, names) = match topic_of(told, channels, &rows) {
+        Some(found) => found,
+        None => {
+            // A table may name its rows as it likes: as many joints on one topic are taken in their order.
+            let mut alike = chosen(told, channels).filter(|j| j.names.len() == rows.len());
+            let Some(only) = alike.next() else { return Err(other_joints(channels, &rows, path)) };
+            unsure.push(format!(
+                "the rows of {} are called {}, the recorded joints {}: they are taken in this order",
+                path.display(),
+                rows.join(", "),
+                only.names.join(", ")
+            ));
+            (only.clone(), only.names.clone())
+        }
+    };
+    unsure.extend(others(told, channels, &source.topic, &names));
+    let model = bare(&chain, Vec::new())?;
+    Ok(Arm {
+        file: path.to_owned(),
+        text,
+        recorded: false,
+        base_link: None,
+        tips: Vec::new(),
+        source,
+        names,
+        links: BTreeSet::new(),
+        model,
+        carried: rows,
+        unsure,
+    })
+}
+
+fn other_joints(channels: &Channels, model: &[String], path: &Path) -> InitError {
+    let topics = channels.joints.iter().map(|j| format!("{} has {}", j.shown(), said(j)));
+    let problem = format!(
+        "no topic has the joints of {} ({}): {}",
+        path.display(),
+        model.join(", "),
+        topics.collect::<Vec<_>>().join("; ")
+    );
+    InitError::Init { problem }
+}
+
+/// The topics that may be meant.
+fn chosen<'a>(told: &'a Told, channels: &'a Channels) -> impl Iterator<Item = &'a JointTopic> {
+    channels.joints.iter().filter(|j| told.joints.as_ref().is_none_or(|asked| is_called(j, asked)))
+}
+
+/// Other topics that have the same joints: of another arm, of set-points, or of a driver beside the first.
+fn others(told: &Told, channels: &Channels, topic: &str, names: &[String]) -> Vec<String> {
+    let has_all = |j: &&JointTopic| j.topic != topic && names.iter().all(|name| j.names.contains(name));
+    let others: Vec<&str> = chosen(told, channels).filter(has_all).map(|j| j.topic.as_str()).collect();
+    let told = format!("{topic} is read; {} has the same joints, and --joints chooses it", others.join(", "));
+    if others.is_empty() { Vec::new() } else { vec![told] }
+}
+
+/// The topic that has all these joints, and their names in it; of several the one with most messages. Messages without names
+/// are read in the order of the model.
+fn topic_of(told: &Told, channels: &Channels, joints: &[String]) -> Option<(JointTopic, Vec<String>)> {
+    let has_all = |j: &&JointTopic| joints.iter().all(|name| j.names.contains(name));
+    let unnamed = |j: &&JointTopic| {
+        j.names.is_empty() && j.field.as_ref().is_none_or(|field| field.values == joints.len())
+    };
+    // Of fields the first: they are in the order of what speaks for them.
+    let most = |j: &&JointTopic| j.field.is_none().then(|| (Reverse(j.messages), j.topic.clone()));
+    let found = chosen(told, channels).filter(has_all).min_by_key(most);
+    found.or_else(|| chosen(told, channels).find(unnamed)).map(|j| (j.clone(), joints.to_vec()))
+}
+
+/// A joint of a URDF.
+struct Link<'a> {
+    joint: &'a str,
+    moves: bool,
+    slides: bool,
+    parent: &'a str,
+}
+
+fn from_urdf(
+    told: &Told,
+    channels: &Channels,
+    file: PathBuf,
+    text: String,
+    recorded: bool,
+) -> Result<Arm, InitError> {
+    let at = |problem: String| format!("{}: {problem}", file.display());
+    let bad = |problem: String| InitError::Init { problem: at(problem) };
+    check_xml(&text).map_err(&bad)?;
+    let document =
+        Document::parse(&text).map_err(|e| bad(format!("is no XML: {e}; a DH table is given with --dh")))?;
+    let joints = joints_of(document.root_element());
+    let named: BTreeSet<&str> = chosen(told, channels).flat_map(|j| &j.names).map(String::as_str).collect();
+    let unnamed = named.is_empty() && chosen(told, channels).next().is_some();
+    let is_read = |l: &Link<'_>| l.moves && (unnamed || named.contains(l.joint));
+    // Fingers: joints that share a parent link and end there.
+    let mut read_on: BTreeMap<&str, usize> = BTreeMap::new();
+    joints.values().filter(|l| is_read(l)).for_each(|l| *read_on.entry(l.parent).or_default() += 1);
+    let counts = |l: &Link<'_>| is_read(l) && !(l.slides && read_on[l.parent] > 1);
+    let depths = depths(&joints, counts);
+    let depth = |link: &&str| depths[link];
+    let ends: Vec<&str> = joints.iter().filter(|(_, l)| counts(l)).map(|(child, _)| *child).collect();
+    let deepest = ends.iter().map(&depth).max().unwrap_or(0);
+    let end = match &told.tip_link {
+        Some(tip) => {
+            let known = joints.get_key_value(tip.as_str()).map(|(link, _)| *link);
+            let known = known.ok_or_else(|| InitError::Usage {
+                problem: at(format!("--tip-link {tip} is no link of it")),
+            })?;
+            path(&joints, known).into_iter().rev().find(|link| counts(&joints[link]))
+        }
+        None => {
+            let all: Vec<&str> = ends.iter().copied().filter(|end| depth(end) == deepest).collect();
+            if all.len() > 1 {
+                let named = all.join(", ");
+                return Err(bad(format!(
+                    "{} arms of {deepest} recorded joints end at {named}: say which with --tip-link LINK",
+                    all.len()
+                )));
+            }
+            all.first().copied()
+        }
+    };
+    let Some(end) = end else {
+        let known: Vec<String> = joints.values().filter(|l| l.moves).map(|l| l.joint.to_owned()).collect();
+        return Err(other_joints(channels, &known, &file));
+    };
+    let way = path(&joints, end);
+    let behind =
+        way.iter().rposition(|link| joints[link].moves && !counts(&joints[link])).map_or(0, |at| at + 1);
+    let moving: Vec<&str> = way[behind..].iter().copied().filter(|link| joints[link].moves).collect();
+    if moving.is_empty() {
+        return Err(bad(format!("no recorded joint leads to {end}")));
+    }
+    let model_joints: Vec<String> = moving.iter().map(|link| joints[link].joint.to_owned()).collect();
+    let (source, names) = topic_of(told, channels, &model_joints)
+        .ok_or_else(|| other_joints(channels, &model_joints, &file))?;
+    let first = way[behind];
+    let above = joints[first].parent;
+    let is_frame_alone = behind == 0 && NO_ROBOT.contains(&above) && !joints[first].moves;
+    let base = if is_frame_alone { first } else { above };
+    let base_link = told.base_link.clone().unwrap_or_else(|| base.to_owned());
+    let tips = match &told.tip_link {
+        Some(tip) => vec![tip.clone()],
+        None => rigid_with(&joints, end),
+    };
+    let chain = Chain::from_urdf(&text, &base_link, tips.first().map_or(end, String::as_str), &file)?;
+    if chain.joint_names() != model_joints {
+        let own = chain.joint_names().join(", ");
+        return Err(bad(format!(
+            "from {base_link} on the way to {end} there are the joints {own}, recorded are {}",
+            model_joints.join(", ")
+        )));
+    }
+    let model = bare(&chain, Vec::new())?;
+    let mut links: BTreeSet<String> = joints.keys().map(|link| (*link).to_owned()).collect();
+    links.extend(joints.values().map(|l| l.parent.to_owned()));
+    let carried = moving.iter().map(|link| (*link).to_owned()).collect();
+    let mut unsure = others(told, channels, &source.topic, &names);
+    if unnamed {
+        let said = format!("{} names no joints: they are read in the order of the model", source.shown());
+        unsure.push(said);
+    }
+    let base_link = Some(base_link);
+    drop(document);
+    Ok(Arm { file, recorded, base_link, tips, source, names, links, model, carried, unsure, text })
+}
+
+/// Every joint by the link that it carries.
+fn joints_of<'a>(robot: Node<'a, '_>) -> BTreeMap<&'a str, Link<'a>> {
+    let child = |joint: Node<'a, '_>, tag: &str| {
+        let found = joint.children().find(|c| c.has_tag_name(tag))?;
+        found.attribute("link")
+    };
+    let joint = |joint: Node<'a, '_>| {
+        let form = joint.attribute("type")?;
+        let mimics = joint.children().any(|c| c.has_tag_name("mimic"));
+        let moves = ["revolute", "continuous", "prismatic"].contains(&form) && !mimics;
+        let (parent, link) = (child(joint, "parent")?, child(joint, "child")?);
+        Some((link, Link { joint: joint.attribute("name")?, moves, slides: form == "prismatic", parent }))
+    };
+    robot.children().filter(|c| c.has_tag_name("joint")).filter_map(joint).collect()
+}
+
+/// The links from behind the root to this one.
+fn path<'a>(joints: &BTreeMap<&'a str, Link<'a>>, link: &str) -> Vec<&'a str> {
+    let mut way: Vec<&str> = Vec::new();
+    let mut at = link;
+    while let Some((link, joint)) = joints.get_key_value(at).filter(|_| way.len() <= joints.len()) {
+        way.push(link);
+        at = joint.parent;
+    }
+    way.reverse();
+    way
+}
+
+/// How many joints that count lead from the root to each link, itself included: each is asked once, however they hang together.
+fn depths<'a>(
+    joints: &BTreeMap<&'a str, Link<'a>>,
+    counts: impl Fn(&Link<'_>) -> bool,
+) -> BTreeMap<&'a str, usize> {
+    let mut depths: BTreeMap<&str, usize> = BTreeMap::new();
+    for link in joints.keys() {
+        let (mut way, mut at) = (Vec::new(), *link);
+        // Joints that form a loop have no root: each of them begins at zero.
+        while let Some((link, joint)) =
+            joints.get_key_value(at).filter(|(link, _)| !depths.contains_key(*link))
+        {
+            depths.insert(link, 0);
+            way.push((*link, joint));
+            at = joint.parent;
+        }
+        let mut depth = depths.get(at).copied().unwrap_or(0);
+        for (link, joint) in way.into_iter().rev() {
+            depth += usize::from(counts(joint));
+            depths.insert(link, depth);
+        }
+    }
+    depths
+}
+
+/// The links that are fixed to this one, those furthest from it first, itself last.
+fn rigid_with(joints: &BTreeMap<&str, Link<'_>>, link: &str) -> Vec<String> {
+    let mut fixed: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for (child, joint) in joints.iter().filter(|(_, joint)| !joint.moves) {
+        fixed.entry(joint.parent).or_default().push(child);
+    }
+    let mut all = vec![(0, link)];
+    let mut at = 0;
+    // Each link has one joint here: only a loop comes by one again, and by this link.
+    while let Some((depth, own)) = all.get(at).copied() {
+        all.extend(fixed.remove(own).into_iter().flatten().map(|child| (depth + 1, child)));
+        at += 1;
+    }
+    all.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(b.1)));
+    all.into_iter().map(|(_, link)| link.to_owned()).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may stop")]
+mod tests {
+    use super::*;
+
+    fn urdf(links: &[(&str, &str, &str, &str)]) -> String {
+        let joint = |(name, form, parent, child): &(&str, &str, &str, &str)| {
+            format!(
+                "<joint name=\"{name}\" type=\"{form}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"0 0 0.2\"/>\
+                 <axis xyz=\"0 1 0\"/></joint>"
+            )
+        };
+        let names: BTreeSet<&str> = links.iter().flat_map(|l| [l.2, l.3]).collect();
+        let names = names.iter().map(|name| format!("<link name=\"{name}\"/>"));
+        format!(
+            "<robot name=\"r\">{}{}</robot>",
+            names.collect::<String>(),
+            links.iter().map(joint).collect::<String>()
+        )
+    }
+
+    fn recorded(names: &[&str]) -> Channels {
+        let names = names.iter().map(|n| (*n).to_owned()).collect();
+        Channels {
+            joints: vec![JointTopic { topic: "/j".into(), names, messages: 1, field: None }],
+            ..Channels::default()
+        }
+    }
+
+    const ARM: [(&str, &str, &str, &str); 7] = [
+        ("mount", "fixed", "world", "base"),
+        ("lift", "prismatic", "base", "column"),
+        ("a", "revolute", "column", "l1"),
+        ("b", "continuous", "l1", "l2"),
+        ("f1", "prismatic", "hand", "finger1"),
+        ("f2", "prismatic", "hand", "finger2"),
+        ("hold", "fixed", "l2", "hand"),
+    ];
+
+    #[test]
+    fn the_arm_is_what_moves_and_is_read_without_its_fingers() {
+        let found = |names: &[&str]| {
+            from_urdf(&Told::default(), &recorded(names), "r.urdf".into(), urdf(&ARM), false).unwrap()
+        };
+        let whole = found(&["f1", "b", "a", "f2", "lift"]);
+        assert_eq!(
+            (whole.names.join(" "), whole.base_link.as_deref()),
+            ("lift a b".to_owned(), Some("base"))
+        );
+        assert_eq!(whole.tips, ["hand", "l2"]);
+        assert_eq!(whole.carried, ["column", "l1", "l2"]);
+        // What is not read stands still: the arm begins above it.
+        let above = found(&["a", "b"]);
+        assert_eq!((above.names.join(" "), above.base_link.as_deref()), ("a b".to_owned(), Some("column")));
+    }
+
+    #[test]
+    fn two_arms_in_one_file_are_not_guessed_between() {
+        let two = [("a", "revolute", "body", "l1"), ("b", "revolute", "body", "r1")];
+        let find = |told: &Told| from_urdf(told, &recorded(&["a", "b"]), "r.urdf".into(), urdf(&two), false);
+        let refused = find(&Told::default()).err().unwrap().to_string();
+        assert!(refused.contains("l1, r1") && refused.contains("--tip-link"), "{refused}");
+        let told = Told { tip_link: Some("r1".into()), ..Told::default() };
+        assert_eq!(find(&told).unwrap().names, ["b"]);
+    }
+}

@@ -1,0 +1,295 @@
+//! What is on the channels of all recordings: joint names, tracked bodies, a thermometer, the robot's description.
+
+use super::fields::{Field, Fields};
+use super::files::Opened;
+use crate::error::InitError;
+use armcal_recording::decode::{Plan, Role, Rows, readable_as};
+use armcal_recording::{RawChannel, RawSchema, RecordingError, inflated};
+use armcal_stages::RunError;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::Arc;
+
+/// Messages of a channel that are looked into for names: the first so many, then every so-manieth.
+const FIRST: u64 = 100;
+const EVERY: u64 = 50;
+/// More names of joints or bodies than this are no arm in a laboratory.
+const MOST_NAMES: usize = 64;
+/// More types of messages than this that could hold joints, bodies or a temperature are no laboratory's.
+const MOST_TYPES: usize = 1000;
+
+/// A topic of joint readings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointTopic {
+    /// Its topic.
+    pub topic: String,
+    /// The joints it names, in the order of the messages; empty where it names none.
+    pub names: Vec<String>,
+    /// Messages in all recordings.
+    pub messages: u64,
+    /// Where they are in a message that armcal does not know.
+    pub field: Option<Field>,
+}
+
+impl JointTopic {
+    /// What `--joints` calls it.
+    pub fn shown(&self) -> String {
+        self.field.as_ref().map_or_else(|| self.topic.clone(), |f| format!("{}:{}", self.topic, f.position))
+    }
+}
+
+/// A tracked body.
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BodyTopic {
+    /// Its topic.
+    pub topic: String,
+    /// Its name, where the topic has several.
+    pub body: Option<String>,
+    /// The frame that it is compared with others in, where they hang on several.
+    pub frame: Option<String>,
+    /// Where it is in a message that armcal does not know.
+    pub position: Option<String>,
+    /// With `position`: how it is turned.
+    pub orientation: Option<String>,
+}
+
+impl BodyTopic {
+    /// What it is called where people read it.
+    pub fn shown(&self) -> String {
+        let what =
+            [&self.body, &self.position].into_iter().flatten().cloned().collect::<Vec<_>>().join(" at ");
+        if what.is_empty() { self.topic.clone() } else { format!("{what} of {}", self.topic) }
+    }
+}
+
+/// What all the recordings have in common, and what is left over.
+#[derive(Debug, Default)]
+pub struct Channels {
+    /// Joint readings.
+    pub joints: Vec<JointTopic>,
+    /// Tracked bodies.
+    pub bodies: Vec<BodyTopic>,
+    /// Thermometers.
+    pub temperatures: Vec<String>,
+    /// Numbers called temperatures in messages that armcal does not know: topic and path.
+    pub warm: Vec<(String, String)>,
+    /// Texts that are a robot's description.
+    pub urdfs: BTreeSet<String>,
+    /// What is not used, and why.
+    pub left: Vec<(String, String)>,
+}
+
+/// What one topic holds.
+#[derive(Default)]
+struct Found {
+    recordings: usize,
+    messages: u64,
+    role: Option<Role>,
+    thermometer: bool,
+    describes: bool,
+    names: Vec<String>,
+    why_not: String,
+}
+
+/// Looks into every recording.
+pub fn look(opened: &[Opened]) -> Result<Channels, InitError> {
+    let mut found: BTreeMap<String, Found> = BTreeMap::new();
+    let mut fields: BTreeMap<String, Fields> = BTreeMap::new();
+    let mut channels = Channels::default();
+    for Opened { entry, recording } in opened {
+        let mut own: BTreeMap<String, Found> = BTreeMap::new();
+        let mut plans = Plans::default();
+        for channel in recording.channels() {
+            let topic = own.entry(channel.topic.clone()).or_default();
+            let Some(schema) = &channel.schema else { continue };
+            match plans.add(schema, &channel) {
+                Ok(role) => {
+                    topic.role = topic.role.or(Some(role));
+                    topic.thermometer |= role == Role::Scalar && is_thermometer(&channel);
+                }
+                Err(why) => {
+                    topic.why_not = why;
+                    if let Some(known) = fields.get_mut(&channel.topic) {
+                        known.next_recording();
+                    } else if fields.len() < MOST_TYPES {
+                        let mut found = Fields::of(schema, &channel.message_encoding);
+                        found.next_recording();
+                        fields.extend((!found.is_empty()).then(|| (channel.topic.clone(), found)));
+                    }
+                }
+            }
+        }
+        let promising: BTreeSet<String> = fields.keys().cloned().collect();
+        let wanted = |c: &RawChannel| is_text(c) || promising.contains(&c.topic) || plans.of(c).is_some();
+        let (urdfs, allowance) = (&mut channels.urdfs, recording.allowance());
+        recording
+            .for_each_raw_of(&wanted, &mut |message| {
+                let Some(topic) = own.get_mut(&message.channel.topic) else { return Ok(()) };
+                topic.messages += 1;
+                // Two that follow each other, so that what changes is seen too.
+                if topic.messages > FIRST && topic.messages % EVERY > 1 {
+                    return Ok(());
+                }
+                let Ok(data) = inflated(message.data, &allowance) else { return Ok(()) };
+                if let Some(fields) = fields.get_mut(&message.channel.topic) {
+                    fields.add(topic.messages, message.log_ns as i64, &data);
+                }
+                if is_text(message.channel) {
+                    let found = text_in(&data).filter(|text| text.contains("<robot")).map(str::to_owned);
+                    let before = urdfs.len();
+                    urdfs.extend(found);
+                    topic.describes |= urdfs.len() > before;
+                }
+                if let Some(plan) = plans.of(message.channel) {
+                    topic.add(names_in(plan, &data));
+                }
+                Ok(())
+            })
+            .and_then(|()| recording.within(&allowance))
+            // What the pass found to be lost is noted, whatever becomes of the proposal.
+            .and_then(|()| recording.whole_report().map(drop))
+            .map_err(|source: RecordingError| RunError::Recording { recording: entry.name(), source })?;
+        for (topic, own) in own {
+            let all = found.entry(topic).or_default();
+            let Found { messages, role, thermometer, describes, names, why_not, .. } = own;
+            all.recordings += usize::from(messages > 0);
+            all.messages += messages;
+            all.role = all.role.or(role);
+            all.thermometer |= thermometer;
+            all.describes |= describes;
+            all.add(names);
+            all.why_not = why_not;
+        }
+    }
+    for (topic, found) in found {
+        let all = found.recordings == opened.len() && found.role.is_none();
+        if let Some(fields) = fields.get(&topic).filter(|_| all) {
+            channels.joints.extend(fields.joints(&topic, found.messages));
+            channels.bodies.extend(fields.bodies(&topic));
+            channels.warm.extend(fields.thermometers.iter().map(|path| (topic.clone(), path.clone())));
+        }
+        channels.sort(topic, found, opened.len());
+    }
+    // The surest field first; what is known by its type before any.
+    channels.joints.sort_by_key(|j| j.field.as_ref().map(|f| Reverse(f.surety)));
+    Ok(channels)
+}
+
+/// How the messages of channels are read; thousands of channels may share one schema, which is compiled once.
+#[derive(Default)]
+struct Plans {
+    plans: Vec<Plan>,
+    /// Place of the plan of a schema with a message encoding, or why there is none.
+    schemas: HashMap<(Arc<RawSchema>, Arc<str>), Result<usize, String>>,
+    channels: HashMap<Arc<RawChannel>, usize>,
+}
+
+impl Plans {
+    /// The role of a channel of this schema.
+    ///
+    /// # Errors
+    /// Why it has none.
+    fn add(&mut self, schema: &Arc<RawSchema>, channel: &Arc<RawChannel>) -> Result<Role, String> {
+        let encoding = &channel.message_encoding;
+        let plans = &mut self.plans;
+        let compile = || {
+            let (name, language, data) = (&schema.name, &schema.encoding, &schema.data);
+            let role = readable_as(name, language, data, encoding).map_err(|e| e.to_string())?;
+            if plans.len() == MOST_TYPES {
+                return Err(format!("one of more than {MOST_TYPES} types of messages that could be read"));
+            }
+            let plan = Plan::compile(role, name, language, data, encoding, None);
+            plans.push(plan.map_err(|e| e.to_string())?);
+            Ok(plans.len() - 1)
+        };
+        let place = self.schemas.entry((schema.clone(), encoding.clone())).or_insert_with(compile).clone()?;
+        self.channels.insert(channel.clone(), place);
+        Ok(self.plans[place].role())
+    }
+
+    fn of(&self, channel: &RawChannel) -> Option<&Plan> {
+        self.channels.get(channel).map(|place| &self.plans[*place])
+    }
+}
+
+impl Found {
+    fn add(&mut self, names: Vec<String>) {
+        for name in names {
+            if !self.names.contains(&name) && self.names.len() < MOST_NAMES {
+                self.names.push(name);
+            }
+        }
+    }
+}
+
+impl Channels {
+    fn sort(&mut self, topic: String, found: Found, recordings: usize) {
+        let Found { names, messages, .. } = found;
+        let mut leave = |why: String| self.left.push((topic.clone(), why));
+        match found.role {
+            _ if messages == 0 && found.role.is_some() => leave("no message".to_owned()),
+            // What it describes is told with the arm.
+            None if found.describes => {}
+            None if found.why_not.is_empty() => leave("not of a kind that a calibration reads".to_owned()),
+            None => leave(found.why_not),
+            Some(_) if found.recordings < recordings => {
+                leave(format!("only in {} of {recordings} recordings", found.recordings));
+            }
+            Some(Role::Joints) => self.joints.push(JointTopic { topic, names, messages, field: None }),
+            Some(Role::Scalar) if found.thermometer => self.temperatures.push(topic),
+            Some(Role::Scalar) => {
+                leave("one number: if it is an instrument, see docs/measures.md".to_owned())
+            }
+            Some(Role::Pose) if names.len() < 2 => {
+                self.bodies.push(BodyTopic { topic, ..BodyTopic::default() })
+            }
+            Some(Role::Pose) => {
+                self.bodies.extend(names.into_iter().map(|name| BodyTopic {
+                    topic: topic.clone(),
+                    body: Some(name),
+                    ..BodyTopic::default()
+                }));
+            }
+        }
+    }
+}
+
+/// The message type says it, or the topic does: a plain number may be anything.
+fn is_thermometer(channel: &RawChannel) -> bool {
+    let schema = channel.schema.as_ref().map_or("", |s| &*s.name);
+    [schema, channel.topic.as_str()].iter().any(|name| name.to_lowercase().contains("temperature"))
+}
+
+fn names_in(plan: &Plan, data: &[u8]) -> Vec<String> {
+    match plan.role() {
+        Role::Pose => plan.bodies(data).unwrap_or_default(),
+        Role::Scalar => Vec::new(),
+        Role::Joints => {
+            let mut rows = Rows::new(Role::Joints);
+            match (plan.decode(data, &mut rows), &rows) {
+                (Ok(()), Rows::Joints(rows)) => rows.rows().flat_map(|row| row.names.to_vec()).collect(),
+                _ => Vec::new(),
+            }
+        }
+    }
+}
+
+/// `std_msgs/String`.
+fn is_text(channel: &RawChannel) -> bool {
+    let schema = channel.schema.as_ref();
+    *channel.message_encoding == *"cdr"
+        && schema.is_some_and(|s| s.name.starts_with("std_msgs/") && s.name.ends_with("/String"))
+}
+
+/// The text of a string message: behind the encapsulation header its length, its bytes, a zero.
+fn text_in(data: &[u8]) -> impl Iterator<Item = &str> {
+    let text = || {
+        let (head, rest) = data.split_at_checked(4)?;
+        let (length, text) = rest.split_first_chunk::<4>()?;
+        let little = head[1] & 1 == 1;
+        let length = if little { u32::from_le_bytes(*length) } else { u32::from_be_bytes(*length) };
+        let bytes = text.get(..usize::try_from(length).ok()?)?;
+        std::str::from_utf8(bytes.strip_suffix(&[0]).unwrap_or(bytes)).ok()
+    };
+    text().into_iter()
+}

@@ -1,0 +1,221 @@
+//! `armcal init`: what recordings show of their rig, as a pipeline that runs, with the reason for each line.
+//!
+//! `files -> channels -> arm -> read -> evidence -> roles -> sockets -> proposal -> page`, then the proposal is tried.
+//!
+//! What a body is follows from how it moves; what it is called decides nothing. Nothing is asked that can be seen, and what
+//! could not be seen is said.
+
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
+mod arm;
+mod channels;
+mod draft;
+mod error;
+mod evidence;
+mod fields;
+mod files;
+mod frames;
+mod motion;
+mod page;
+mod points;
+mod proposal;
+mod read;
+mod roles;
+mod seats;
+mod sockets;
+
+pub use arm::Told;
+pub use channels::BodyTopic;
+pub use error::InitError;
+pub use proposal::Proposal;
+pub use roles::{Cast, Role};
+
+use armcal_calibrate::HoldoutConfig;
+use armcal_recording::input::Kind;
+use armcal_stages::associated::Associated;
+use armcal_stages::perceive;
+use armcal_stages::{Inputs, Silent, Steps};
+use armcal_table::Board;
+use channels::Channels;
+use proposal::Known;
+use std::path::{Path, PathBuf};
+
+/// Pauses below which nothing can be calibrated.
+const FEWEST_PAUSES: usize = 6;
+
+/// What a proposal is made from.
+#[derive(Debug, Clone)]
+pub struct Asked {
+    /// Recordings: files, folders, patterns.
+    pub inputs: Vec<String>,
+    /// What the user says of the arm.
+    pub told: Told,
+    /// Board file.
+    pub board: Option<PathBuf>,
+    /// What a laser tracker exported: a file for each recording, in their order, or none.
+    pub points: Vec<PathBuf>,
+    /// Where the pipeline will be.
+    pub out: PathBuf,
+}
+
+/// Looks at the recordings and proposes a pipeline for them; nothing is written.
+///
+/// # Errors
+/// What is no recording, no arm, joints that are not recorded, an arm that never pauses, nothing that says where the tip was.
+pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitError> {
+    progress.step("opening the recordings");
+    let opened = files::open_all(&asked.inputs, &asked.out)?;
+    let points = asked.points.iter().map(|path| points::look(path)).collect::<Result<Vec<_>, InitError>>()?;
+    if !points.is_empty() && points.len() != opened.len() {
+        let names: Vec<String> = opened.iter().map(|o| o.entry.name()).collect();
+        let problem = format!(
+            "--points was given {} times for {} recordings ({}): give one file for each, in this order",
+            points.len(),
+            opened.len(),
+            names.join(", ")
+        );
+        return Err(InitError::Init { problem });
+    }
+    let mut channels = channels::look(&opened)?;
+    if !points.is_empty() {
+        let seen = std::mem::take(&mut channels.bodies);
+        let why = "--points says where the tip was, in the frame of another sensor";
+        channels.left.extend(seen.iter().map(|body| (body.shown(), why.to_owned())));
+    }
+    if channels.joints.is_empty() {
+        return Err(no_joints(&channels));
+    }
+    let paths = opened.iter().flat_map(|o| &o.entry.paths);
+    let folders = paths.filter_map(|p| p.parent()).map(Path::to_owned).collect();
+    let arm = arm::find(&asked.told, &channels, &folders, &asked.out.with_extension("urdf"))?;
+    progress.step("reading the recordings");
+    let read = read::read(&arm, &channels, &opened)?;
+    let pauses: usize = read.recordings.iter().map(|r| r.dwells.len()).sum();
+    if pauses < FEWEST_PAUSES {
+        let problem = format!(
+            "the joints on {} stand still {pauses} times in all recordings; a calibration takes {FEWEST_PAUSES} pauses of about a \
+             second at the very least (docs/guide.md says how to record them)",
+            arm.source.shown()
+        );
+        return Err(InitError::Init { problem });
+    }
+    progress.step("comparing motions");
+    let board = asked.board.as_deref().map(read_board).transpose()?;
+    let evidence = evidence::gather(&arm, &read);
+    let (cast, seats) = roles::cast(&arm, &evidence, board.as_ref());
+    let tracked = !points.is_empty()
+        || cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
+    // Where no sensor sees the tip, its pauses show on which link it is, and without a board where it sat.
+    let sockets = if tracked { None } else { sockets::find(&arm, &read)? };
+    if board.is_none() && !tracked && sockets.is_none() {
+        return Err(nothing_seen(&arm, &read, &cast));
+    }
+    let board = asked.board.as_deref().zip(board.as_ref());
+    let mut known = Known {
+        asked,
+        opened: &opened,
+        arm: &arm,
+        read: &read,
+        evidence: &evidence,
+        cast: &cast,
+        seats,
+        board,
+        sockets,
+        points,
+        warm: &channels.warm,
+    };
+    if known.sockets.is_some() && known.board.is_none() {
+        progress.step("measuring the sockets");
+        size_sockets(&mut known)?;
+    }
+    let mut left = channels.left;
+    let used = |topic: &str| topic == arm.source.topic || read.bodies.iter().any(|b| b.topic == topic);
+    left.retain(|(topic, _)| !used(topic));
+    let mut proposal = known.propose(left)?;
+    // The trial opens them again.
+    drop((read, opened));
+    progress.step("trying the proposal");
+    proposal.tried = Some(tried(&proposal));
+    Ok(proposal)
+}
+
+fn read_board(path: &Path) -> Result<Board, InitError> {
+    Ok(Board::from_toml(&armcal_config::read_text("board", Kind::Text, path)?, path)?)
+}
+
+fn no_joints(channels: &Channels) -> InitError {
+    let left = channels.left.iter().map(|(topic, why)| format!("{topic} ({why})"));
+    let bodies = channels.bodies.iter().map(|b| format!("{} (a tracked body)", b.shown()));
+    let warm = channels.temperatures.iter().map(|t| format!("{t} (a thermometer)"));
+    let seen: Vec<String> = bodies.chain(warm).chain(left).collect();
+    let problem = match seen.is_empty() {
+        true => "nothing is recorded: there is no channel at all. `armcal inspect` shows what a file holds"
+            .to_owned(),
+        false => format!(
+            "no topic has joint readings in every recording: {}; record the topic of the joints too (ros2 bag record /joint_states ..)",
+            seen.join("; ")
+        ),
+    };
+    InitError::Init { problem }
+}
+
+fn nothing_seen(arm: &arm::Arm, read: &read::AllRead, cast: &[Cast]) -> InitError {
+    let bodies = read.bodies.iter().zip(cast).map(|(body, cast)| format!("{}: {}", body.shown(), cast.why));
+    let bodies: Vec<String> = bodies.collect();
+    let bodies = if bodies.is_empty() { "no body is tracked".to_owned() } else { bodies.join("; ") };
+    let left = read.left.iter().map(|(what, why)| format!("; not used: {what}: {why}")).collect::<String>();
+    let unsure = arm.unsure.iter().map(|said| format!(". Unsure: {said}")).collect::<String>();
+    let problem = format!(
+        "nothing says where the tip was: {bodies}{left}; and its pauses are not in a few places that it came back to in other \
+         postures. Give --board FILE if it sat in cavities of a board (docs/guide.md shows one){unsure}"
+    );
+    InitError::Init { problem }
+}
+
+/// Finds how large the fixture is, with the pipeline as it would be proposed.
+fn size_sockets(known: &mut Known<'_>) -> Result<(), InitError> {
+    let mut pipeline = known.propose(Vec::new())?.pipeline;
+    pipeline.holdout = HoldoutConfig::None;
+    let chain =
+        match (known.sockets.as_ref().and_then(|s| s.tip_link.as_ref()), pipeline.model.urdf.is_some()) {
+            (Some(tip), true) => known.arm.model_to(tip)?.chain().clone(),
+            _ => known.arm.model.chain().clone(),
+        };
+    let chain = match &pipeline.model.deviation {
+        Some(deviation) => chain.with_deviation(deviation, &known.arm.file)?,
+        None => chain,
+    };
+    let recordings = perceive::open_all(&pipeline, &Silent)?;
+    let seen = perceive::dwells_of_all(&pipeline, &chain, &recordings, &Silent, &mut drop)?;
+    if let Some(sockets) = &mut known.sockets {
+        let board = Some(sockets.board.clone());
+        let (changes, most_rounds, known) = (Vec::new(), 2, Associated::default());
+        sockets.sized(&Inputs { pipeline, chain, board, seen, changes, most_rounds, known });
+    }
+    Ok(())
+}
+
+/// What a first calibration with a proposal came to.
+#[derive(Debug, Clone)]
+pub struct Tried {
+    /// Held-out points, or all where none is held out.
+    pub points: usize,
+    /// Mean error there before and after [m].
+    pub mean_m: [f64; 2],
+    /// What contradicts the data about the setup, in words.
+    pub mistakes: Vec<String>,
+}
+
+/// Calibrates with a proposal whose files may not be written yet: they are put beside a copy of it.
+fn tried(proposal: &Proposal) -> Result<Tried, String> {
+    let attempt = || -> Result<Tried, InitError> {
+        let folder =
+            tempfile::tempdir().map_err(|source| InitError::Folder { path: std::env::temp_dir(), source })?;
+        let pipeline = proposal.in_folder(folder.path())?;
+        let settled = armcal_pipeline::settle(&pipeline, &Silent)?;
+        let judged = settled.fitted.calibration.judged();
+        let mistakes = settled.setup.mistakes().map(|m| m.message.clone()).collect();
+        Ok(Tried { points: judged.fitted.n, mean_m: [judged.nominal.mean_m, judged.fitted.mean_m], mistakes })
+    };
+    attempt().map_err(|e| e.to_string())
+}

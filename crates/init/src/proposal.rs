@@ -1,0 +1,149 @@
+//! The proposal: what was found, as the sections of a pipeline.
+
+use super::arm::Arm;
+use super::channels::BodyTopic;
+use super::draft::Draft;
+use super::evidence::Evidence;
+use super::files::Opened;
+use super::page::{Page, quoted};
+use super::points::Points;
+use super::read::AllRead;
+use super::roles::{Cast, Role};
+use super::seats::Seats;
+use super::sockets::Sockets;
+use super::{Asked, Tried};
+use crate::error::InitError;
+use armcal_config::Pipeline;
+use armcal_recording::{atomic, sealed};
+use armcal_table::Board;
+use std::path::{Path, PathBuf};
+
+/// First line of a proposal: what makes it one of armcal's files.
+const MARK: &str = "armcal.pipeline/1, proposed by `armcal init`; every line may be changed";
+
+/// A pipeline that may be written.
+pub struct Proposal {
+    /// The pipeline, as the program reads it.
+    pub pipeline: Pipeline,
+    /// Its file.
+    pub out: PathBuf,
+    /// Files that it names and that are still to be written.
+    pub beside: Vec<(PathBuf, String)>,
+    /// The bodies and their roles.
+    pub bodies: Vec<(BodyTopic, Cast)>,
+    /// What may be otherwise.
+    pub unsure: Vec<String>,
+    /// What nothing in the recordings shows, and where to fill it in.
+    pub unseen: Vec<String>,
+    /// Topics that are not used, and why.
+    pub left: Vec<(String, String)>,
+    /// What a first calibration came to, or why there was none.
+    pub tried: Option<Result<Tried, String>>,
+}
+
+impl Proposal {
+    /// Whether a first calibration with it went well.
+    pub fn runs(&self) -> bool {
+        matches!(&self.tried, Some(Ok(tried)) if tried.mistakes.is_empty())
+    }
+
+    /// The same pipeline with the unwritten files in another folder.
+    pub fn in_folder(&self, folder: &Path) -> Result<Pipeline, InitError> {
+        let mut pipeline = self.pipeline.clone();
+        for (path, text) in &self.beside {
+            let copy = folder.join(path.file_name().unwrap_or_default());
+            atomic::write(&copy, text.as_bytes()).map_err(InitError::Output)?;
+            if path.extension().is_some_and(|e| e == "urdf") {
+                pipeline.model.urdf = Some(copy);
+            } else if let Some(table) = &mut pipeline.table {
+                table.board = copy;
+            }
+        }
+        Ok(pipeline)
+    }
+}
+
+/// Everything that was found out.
+pub struct Known<'a> {
+    /// What the user said.
+    pub asked: &'a Asked,
+    /// The recordings.
+    pub opened: &'a [Opened],
+    /// The arm.
+    pub arm: &'a Arm,
+    /// What was read.
+    pub read: &'a AllRead,
+    /// What the bodies did.
+    pub evidence: &'a [Evidence],
+    /// What they are.
+    pub cast: &'a [Cast],
+    /// Which of them fit the board.
+    pub seats: Option<Seats>,
+    /// The board of the user.
+    pub board: Option<(&'a Path, &'a Board)>,
+    /// Sockets without a drawing.
+    pub sockets: Option<Sockets>,
+    /// What a laser tracker exported, of each recording or of none.
+    pub points: Vec<Points>,
+    /// Numbers called temperatures, by topic and path.
+    pub warm: &'a [(String, String)],
+}
+
+impl Known<'_> {
+    /// The proposal, parsed by the very reader of pipelines.
+    pub fn propose(&self, mut left: Vec<(String, String)>) -> Result<Proposal, InitError> {
+        let folder = self.asked.out.parent().unwrap_or(Path::new("")).to_owned();
+        let (beside, unsure, unseen) = (Vec::new(), self.arm.unsure.clone(), Vec::new());
+        let mut draft = Draft { known: self, page: Page::default(), folder, beside, unsure, unseen };
+        draft.recordings();
+        draft.streams();
+        draft.table();
+        draft.model()?;
+        draft.frames();
+        draft.holdout();
+        let Draft { page, folder, beside, unsure, unseen, .. } = draft;
+        let mut head = Page::default();
+        head.note(MARK);
+        for (what, all) in [("unsure", &unsure), ("not visible in the recordings", &unseen)] {
+            all.iter().for_each(|said| head.note(&format!("{what}: {said}")));
+        }
+        let name = self.asked.out.file_stem().unwrap_or_default().to_string_lossy();
+        head.line(&format!("name = {}", quoted(&name)), "");
+        let text = sealed(&(head.text() + &page.text())).into_owned();
+        let pipeline = Pipeline::proposed(&self.asked.out, text, &folder)?;
+        left.extend(self.read.left.clone());
+        let bodies = self.read.bodies.iter().cloned().zip(self.cast.iter().cloned()).collect();
+        Ok(Proposal {
+            pipeline,
+            out: self.asked.out.clone(),
+            beside,
+            bodies,
+            unsure,
+            unseen,
+            left,
+            tried: None,
+        })
+    }
+
+    /// The body with this role.
+    pub fn of_role(&self, role: Role) -> Option<usize> {
+        self.cast.iter().position(|c| c.role == role)
+    }
+
+    /// Bodies on the links of the arm beside the tip.
+    pub fn markers(&self) -> impl Iterator<Item = (usize, usize, &Cast)> {
+        let marker = |(at, cast): (usize, &'_ Cast)| match cast.role {
+            Role::Marker(link) => Some((at, link)),
+            _ => None,
+        };
+        self.cast
+            .iter()
+            .enumerate()
+            .filter_map(move |(at, cast)| marker((at, cast)).map(|(at, link)| (at, link, cast)))
+    }
+
+    /// Pauses of the joints in all recordings.
+    pub fn pauses(&self) -> usize {
+        self.read.recordings.iter().map(|r| r.dwells.len()).sum()
+    }
+}

@@ -1,0 +1,173 @@
+//! Everything that could matter, read as columns, with the units that the numbers themselves show.
+
+use super::arm::Arm;
+use super::channels::{BodyTopic, Channels, JointTopic};
+use super::files::Opened;
+use super::frames;
+use crate::error::InitError;
+use armcal_core::{Dwell, PoseSamples, Samples};
+use armcal_dwell::{DwellConfig, detect_dwells};
+use armcal_recording::{
+    JointStream, JointUnit, LengthUnit, PoseStream, RecordingError, ScalarStream, StreamReport, Streams,
+};
+use armcal_stages::RunError;
+
+/// More bodies than this are the frames of a simulation.
+const MOST_BODIES: usize = 24;
+
+/// One recording in columns.
+pub struct Read {
+    /// Its name.
+    pub name: String,
+    /// The columns; bodies by their [`key`].
+    pub samples: Samples,
+    /// Rates, clocks and losses.
+    pub reports: Vec<StreamReport>,
+    /// The pauses of the joints.
+    pub dwells: Vec<Dwell>,
+}
+
+impl Read {
+    /// What was seen of a body.
+    pub fn body(&self, body: usize) -> Option<&PoseSamples> {
+        self.samples.bodies.get(&key(body)).filter(|seen| !seen.is_empty())
+    }
+
+    /// What was said about the reading of a stream.
+    pub fn report(&self, role: &str) -> Option<&StreamReport> {
+        self.reports.iter().find(|r| r.role == role)
+    }
+}
+
+/// The streams that were read, and of them the recordings.
+pub struct AllRead {
+    /// All that was read: joints, bodies, thermometer.
+    pub streams: Streams,
+    /// The bodies, by the number in their [`key`].
+    pub bodies: Vec<BodyTopic>,
+    /// The recordings, in their order.
+    pub recordings: Vec<Read>,
+    /// What is not read, and why.
+    pub left: Vec<(String, String)>,
+}
+
+/// The name of a body while nobody knows its role.
+pub fn key(body: usize) -> String {
+    format!("b{body:03}")
+}
+
+/// Reads all that may be used.
+pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead, InitError> {
+    let mut left = Vec::new();
+    let mut bodies: Vec<BodyTopic> = Vec::new();
+    for body in &channels.bodies {
+        let of_controller = |j: &JointTopic| {
+            j.topic == body.topic && j.field.as_ref().is_some_and(|f| f.values == arm.names.len())
+        };
+        if body.body.as_ref().is_some_and(|b| arm.links.contains(b)) {
+            left.push((
+                body.shown(),
+                "a link of the robot's own description: computed, not measured".to_owned(),
+            ));
+        } else if channels.joints.iter().any(of_controller) {
+            left.push((
+                body.shown(),
+                "in the message of the joints: computed from them, not measured".to_owned(),
+            ));
+        } else if bodies.len() == MOST_BODIES {
+            left.push((body.shown(), format!("one of more than {MOST_BODIES} bodies")));
+        } else {
+            bodies.push(body.clone());
+        }
+    }
+    frames::join(&mut bodies, opened, &mut left)?;
+    let pose = |b: &BodyTopic| {
+        let BodyTopic { topic, body, frame, position, orientation } = b.clone();
+        PoseStream { topic, body, frame, position, orientation, ..PoseStream::default() }
+    };
+    let field = arm.source.field.as_ref();
+    let thermometer = |topic: &String| ScalarStream { topic: topic.clone(), ..ScalarStream::default() };
+    let mut streams = Streams {
+        joints: vec![JointStream {
+            topic: arm.source.topic.clone(),
+            names: arm.names.clone(),
+            position: field.map(|f| f.position.clone()),
+            name: field.and_then(|f| f.name.clone()),
+            ..JointStream::default()
+        }],
+        bodies: bodies.iter().enumerate().map(|(at, body)| (key(at), pose(body))).collect(),
+        temperature: channels.temperatures.first().map(thermometer),
+        ..Streams::default()
+    };
+    left.extend(channels.temperatures.iter().skip(1).map(|t| (t.clone(), "another thermometer".to_owned())));
+    let mut all = |streams: &mut Streams| -> Result<Vec<Read>, InitError> {
+        opened.iter().map(|one| read_one(one, streams, &mut left)).collect()
+    };
+    let first = streams.clone();
+    let mut recordings = all(&mut streams)?;
+    // A unit that a later recording showed holds for all: the earlier ones are read with it.
+    if streams != first && opened.len() > 1 {
+        recordings = all(&mut streams)?;
+    }
+    Ok(AllRead { streams, bodies, recordings, left })
+}
+
+fn read_one(
+    one: &Opened,
+    streams: &mut Streams,
+    left: &mut Vec<(String, String)>,
+) -> Result<Read, InitError> {
+    let name = one.entry.name();
+    loop {
+        match one.recording.read(streams) {
+            Ok((samples, reports, _)) => {
+                let alone = Samples { joints: samples.joints.clone(), ..Samples::default() };
+                let found = detect_dwells(0, &alone, None, &DwellConfig::default());
+                let (dwells, _) =
+                    found.map_err(|source| RunError::Dwell { recording: name.clone(), source })?;
+                return Ok(Read { name, samples, reports, dwells });
+            }
+            Err(source) => {
+                mend(streams, &source, left).ok_or(RunError::Recording { recording: name.clone(), source })?
+            }
+        }
+    }
+}
+
+/// Reads on after an error that says which other unit it must be, or which body cannot be read.
+fn mend(streams: &mut Streams, error: &RecordingError, left: &mut Vec<(String, String)>) -> Option<()> {
+    let joints = &mut streams.joints[0];
+    match error {
+        RecordingError::WrongUnit { role: "joints", why, .. }
+            if joints.unit == JointUnit::Rad && why.contains("degrees") =>
+        {
+            joints.unit = JointUnit::Deg;
+            Some(())
+        }
+        RecordingError::WrongUnit { role: "bodies", topic, .. } => {
+            let all = streams.bodies.values_mut().filter(|b| b.topic == *topic && b.unit == LengthUnit::M);
+            let mended = all.map(|body| body.unit = LengthUnit::Mm).count();
+            (mended > 0).then_some(()).or_else(|| drop_topic(streams, topic, error, left))
+        }
+        RecordingError::NotDecodable { role: "bodies", topic, .. }
+        | RecordingError::Body { role: "bodies", topic, .. } => drop_topic(streams, topic, error, left),
+        RecordingError::NotDecodable { role: "temperature", topic, .. }
+        | RecordingError::NoRows { role: "temperature", topic, .. } => {
+            left.push((topic.clone(), error.to_string()));
+            streams.temperature.take().map(drop)
+        }
+        _ => None,
+    }
+}
+
+fn drop_topic(
+    streams: &mut Streams,
+    topic: &str,
+    error: &RecordingError,
+    left: &mut Vec<(String, String)>,
+) -> Option<()> {
+    let before = streams.bodies.len();
+    streams.bodies.retain(|_, body| body.topic != topic);
+    left.push((topic.to_owned(), error.to_string()));
+    (streams.bodies.len() < before).then_some(())
+}
