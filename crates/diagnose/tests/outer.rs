@@ -281,13 +281,20 @@ fn the_refit_gives_the_numbers_of_the_verdict() {
 
 /// An arm whose joint 1 rests anywhere in two fifths of its play, on its way back from the flank that pushed it.
 fn resting(seed: u64) -> (Model, Vec<Observation>) {
+    resting_beside(&[], seed)
+}
+
+/// The same with plays of as much in other joints, which are always on a flank.
+fn resting_beside(others: &[&str], seed: u64) -> (Model, Vec<Observation>) {
     let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
     let (model, mut observations) = observed(&[], 0.0, seed);
-    let truth =
-        model.with_effects(&[model.effect("backlash:1").unwrap()], &Session::of(&observations)).unwrap();
+    let plays: Vec<EffectSpec> =
+        ["backlash:1"].iter().chain(others).map(|name| model.effect(name).unwrap()).collect();
+    let truth = model.with_effects(&plays, &Session::of(&observations)).unwrap();
     let mut p = truth.nominal();
-    *p.last_mut().unwrap() = 0.0;
-    p[model.parameters().len()] = WIDTH_RAD;
+    for (k, parameter) in truth.parameters().iter().enumerate().skip(model.parameters().len()) {
+        p[k] = if parameter.name.ends_with("width") { WIDTH_RAD } else { 0.0 };
+    }
     for o in &mut observations {
         let mut rested = o.clone();
         rested.joint_rad[0] += o.arrival[0].sign() * WIDTH_RAD * rng.random_range(0.0..0.4);
@@ -310,7 +317,20 @@ fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is
         let rest: f64 = name.rsplit_once('=').unwrap().1.parse().unwrap();
         let refitted = &d.refitted.as_ref().unwrap().calibration;
         assert!((0.5..0.85).contains(&rest) && (0.85..1.2).contains(&refitted.times_floor()), "{name}");
-        assert!(d.unexplained.is_none() && d.warnings.iter().any(|w| w.code == "rests-in-play"));
+        let width =
+            refitted.fit.estimates.iter().find(|e| e.parameter.name.ends_with(".width")).unwrap().value;
+        let spread = rest * width / WIDTH_RAD;
+        assert!((0.33..0.47).contains(&spread), "{spread} of the play instead of 0.4");
+        assert!(d.unexplained.is_none());
+        let said = &d.warnings.iter().find(|w| w.code == "rests-in-play").unwrap().message;
+        let floor_mm = 1e3 * refitted.noise_floor_m;
+        let parts = [
+            "joint 1 rests".to_owned(),
+            format!("over {:.0} % of the gap", 100.0 * rest),
+            format!("({floor_mm:.3} mm with it"),
+        ];
+        assert!(parts.iter().all(|part| said.contains(part)), "{said}");
+        assert!(d.candidates.iter().all(|c| !c.spec.split('+').any(|part| part == "backlash:1")), "one name");
         // It stays so when it is added.
         let extended =
             model.with_effects(&[model.effect(name).unwrap()], &Session::of(&observations)).unwrap();
@@ -324,6 +344,16 @@ fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is
 fn the_first_row_is_the_answer_of_a_joint_that_rests_in_its_play_too() {
     let (model, observations) = resting(1);
     assert_one_order(&told(&model, &observations).1);
+}
+
+#[test]
+fn of_two_plays_the_one_rests_whose_joint_scatters() {
+    for seed in [1, 2] {
+        let (model, observations) = resting_beside(&["backlash:2"], seed);
+        let names = diagnosed(&model, &calibration(&model, &observations), &observations).names;
+        assert!(names.iter().any(|name| name.starts_with("backlash:1,rest=")), "{names:?}");
+        assert!(names.iter().any(|name| name == "backlash:2"), "{names:?}");
+    }
 }
 
 #[test]
