@@ -140,8 +140,8 @@ pub(crate) fn weights(scores: &[(&Score, f64)], config: &DiagnosisConfig) -> Vec
     let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x00b3_a0b0);
     let mut weights = vec![0.0; scores.len()];
     for _ in 0..config.resamplings {
-        // Weights of a Dirichlet distribution: exponential ones over their sum.
-        let drawn: Vec<f64> = (0..groups).map(|_| -(1.0 - rng.random::<f64>()).ln()).collect();
+        // Weights of a Dirichlet distribution: exponential ones over their sum, in which their sign cancels.
+        let drawn: Vec<f64> = (0..groups).map(|_| (1.0 - rng.random::<f64>()).ln()).collect();
         let scale = groups as f64 / drawn.iter().sum::<f64>();
         let ln = |(score, cost): &(&Score, f64)| {
             let each = score.by_group.iter().zip(&drawn).map(|(ln, weight)| ln * weight);

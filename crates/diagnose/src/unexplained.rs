@@ -67,3 +67,34 @@ impl Unexplained {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a warning would be of errors so many times the noise, of which such a share is explained.
+    fn severity(verdict: Verdict, times_floor: f64, explained_share: f64) -> Option<Severity> {
+        let left = Unexplained {
+            error_mm: 0.6,
+            floor_mm: 0.2,
+            repeatability_mm: None,
+            times_floor,
+            explained_share,
+            places: Vec::new(),
+            scatter: None,
+            tried: Tried { listed: 3, unlisted: 4 },
+        };
+        left.warning(verdict, &DiagnosisConfig::default()).map(|w| w.severity)
+    }
+
+    #[test]
+    fn a_result_is_inadequate_beyond_the_noise_and_where_less_than_half_is_explained() {
+        let limit = DiagnosisConfig::default().floor_factor;
+        let (alone, named) = (Verdict::Unexplained, Verdict::Identified);
+        assert_eq!(severity(alone, limit, 0.0), Some(Severity::Notice), "no more than that is not beyond it");
+        assert_eq!(severity(alone, 1.01 * limit, 1.0), Some(Severity::Inadequate));
+        assert_eq!(severity(named, limit, 0.0), None);
+        assert_eq!(severity(named, 1.01 * limit, 0.49), Some(Severity::Inadequate));
+        assert_eq!(severity(named, 1.01 * limit, 0.5), None, "half is enough");
+    }
+}

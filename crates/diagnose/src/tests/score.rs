@@ -162,3 +162,13 @@ proptest! {
         prop_assert_eq!(named(&before, |i| i), named(&after, |i| order[i]));
     }
 }
+
+#[test]
+fn a_part_is_halved_along_its_longest_side_wherever_it_lies() {
+    // Short where its numbers are large, long where they are small.
+    let centres: Vec<Vec<f64>> = [0.0, 3.0, 1.0, 2.0].iter().map(|x| vec![100.0 - x / 10.0, *x]).collect();
+    assert_eq!(halves(&[0, 1, 2, 3], &centres), [vec![0, 2], vec![3, 1]]);
+    let along_the_first: Vec<Vec<f64>> = [0.0, 3.0, 1.0, 2.0].iter().map(|x| vec![-x, 50.0]).collect();
+    assert_eq!(halves(&[0, 1, 2, 3], &along_the_first), [vec![1, 3], vec![2, 0]]);
+    assert_eq!(halves(&[2], &centres), [vec![2]]);
+}
