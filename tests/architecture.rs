@@ -1,4 +1,5 @@
-//! The rooms of the house, read from the sources: which modules lean on each other in a circle.
+//! The rooms of the house, read from the sources: which modules lean on each other in a circle, and whether the crates lean on
+//! each other as docs/architecture.md has them.
 
 use crate::support::root;
 use std::collections::{BTreeMap, BTreeSet};
@@ -179,13 +180,54 @@ fn no_room_leans_on_one_that_leans_on_it() {
     let listed = include_str!("support/circles.txt");
     let listed: BTreeSet<String> =
         listed.lines().filter(|l| !l.starts_with('#')).map(str::to_owned).collect();
-    let crates = std::fs::read_dir(root().join("crates")).expect("crates");
-    let names = crates.map(|entry| entry.expect("an entry").file_name().into_string().expect("a name"));
-    let found: BTreeSet<String> = names.flat_map(|name| circles(&name)).collect();
+    let found: BTreeSet<String> = manifests().keys().flat_map(|name| circles(name)).collect();
     let new: Vec<&String> = found.difference(&listed).collect();
     let gone: Vec<&String> = listed.difference(&found).collect();
     assert!(
         new.is_empty() && gone.is_empty(),
         "circles that tests/support/circles.txt does not have: {new:#?}\nthat it has and are no more: {gone:#?}"
     );
+}
+
+/// What is in the Cargo.toml of every crate of the workspace, by its folder below `crates`.
+fn manifests() -> BTreeMap<String, toml::Table> {
+    let mut all = BTreeMap::new();
+    for above in ["", "dev/"] {
+        for entry in std::fs::read_dir(root().join("crates").join(above)).expect("crates") {
+            let entry = entry.expect("an entry");
+            let name = format!("{above}{}", entry.file_name().into_string().expect("a name"));
+            if let Ok(text) = std::fs::read_to_string(entry.path().join("Cargo.toml")) {
+                all.insert(name, text.parse().expect("a manifest"));
+            }
+        }
+    }
+    all
+}
+
+/// The packages that a crate is made from; what its tests take beside them is not asked.
+fn dependencies(manifest: &toml::Table) -> Vec<String> {
+    let of_system = manifest.get("target").and_then(toml::Value::as_table);
+    let tables = of_system.into_iter().flat_map(|t| t.values()).filter_map(toml::Value::as_table);
+    let kinds = ["dependencies", "build-dependencies"];
+    let all = tables.chain([manifest]).flat_map(|table| kinds.map(|kind| table.get(kind)));
+    all.flatten().filter_map(toml::Value::as_table).flat_map(|t| t.keys().cloned()).collect()
+}
+
+/// The list of crates is the house: none is missing, and each leans only on those before it.
+#[test]
+fn the_crates_lean_on_each_other_as_the_map_has_them() {
+    let map = std::fs::read_to_string(root().join("docs/architecture.md")).expect("the map");
+    let rows = map.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` |"));
+    let listed: Vec<&str> = rows.map(|(name, _)| name).collect();
+    let manifests = manifests();
+    let mut sorted = listed.clone();
+    sorted.sort_unstable();
+    assert_eq!(sorted, manifests.keys().collect::<Vec<_>>(), "the crates that docs/architecture.md lists");
+    let package = |name: &str| manifests[name]["package"]["name"].as_str().expect("a name").to_owned();
+    let packages: Vec<String> = listed.iter().map(|name| package(name)).collect();
+    for (at, name) in listed.iter().enumerate() {
+        let needs = dependencies(&manifests[*name]);
+        let up: Vec<&String> = packages[at..].iter().filter(|above| needs.contains(above)).collect();
+        assert!(up.is_empty(), "{name} leans on {up:?}, which docs/architecture.md has above it");
+    }
 }

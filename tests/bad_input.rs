@@ -268,9 +268,6 @@ fn names_that_do_not_exist_are_usage_errors_with_the_nearest_name() {
         (&["add", "backlash:9", "p.toml"], "backlash:9"),
         (&["plan", "p.toml", "--effects", "backlash:1,eccentricty:2"], "did you mean \"eccentricity\"?"),
         (&["plan", "p.toml", "--range", "7=0..1"], "--range 7=0..1"),
-        (&["score", "nothing", "bcklash"], "did you mean `backlash`?"),
-        (&["score", "nothing", "--design", "free-pose"], "free-poses"),
-        (&["score", "backlash+gear_rato"], "did you mean `gear_ratio`?"),
         (&["simulate", "--hide", "bcklash"], "did you mean `backlash`?"),
         (&["simulate", "--hide", "nothing", "--size", "larg"], "large"),
         (

@@ -30,8 +30,8 @@ const READ: [&[&str]; 16] = [
     &["pool", "p.toml", "lossy", "--out", "pooled"],
 ];
 /// The others, and `view`, which does not end by itself.
-const NO_RECORDING: [&str; 9] =
-    ["compare", "compensate", "completions", "effects", "man", "score", "simulate", "write", "view"];
+const NO_RECORDING: [&str; 8] =
+    ["compare", "compensate", "completions", "effects", "man", "simulate", "write", "view"];
 
 /// A kind of damage, and what it makes of the sound recording.
 type Damage = (&'static str, fn(&[u8], &Path));

@@ -5,10 +5,10 @@
 
 use crate::support::root;
 use armcal::progress::Progress;
-use armcal::score::nominal_model;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_config::Pipeline;
 use armcal_lab::scenario::{Design, Scenario};
+use armcal_score::nominal_model;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

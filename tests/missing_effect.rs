@@ -1,5 +1,6 @@
 use crate::support::{armcal, number, paper_pipeline, read_json, root, run_pipeline, shipped, simulate};
 use serde_json::Value;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Simulates a laboratory and returns a pipeline on its recordings; the truth stays where only the assertion looks.
@@ -230,4 +231,27 @@ fn a_sensor_is_trusted_as_far_as_the_user_says() {
     let output = armcal([Path::new("run"), &pipeline, Path::new("--out"), &folder.path().join("refused")]);
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(1) && words.contains("sensor_scale.xy"), "{words}");
+}
+
+/// What the page and the terminal offer to paste is all that is needed: pasted by hand, the error falls.
+#[test]
+fn the_pasted_table_of_something_unlisted_removes_most_of_the_error() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let lab = folder.path().join("lab");
+    let made = armcal(
+        ["simulate", "--hide", "outside:twist", "--seed", "7001", "--out"]
+            .map(OsStr::new)
+            .into_iter()
+            .chain([lab.as_os_str()]),
+    );
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let pipeline = lab.join("pipeline.toml");
+    let before = run_pipeline(&pipeline, &folder.path().join("before"), &[0, 3]);
+    let table = before["diagnosis"]["unknown"]["table"].as_str().expect("a table to paste");
+    let text = std::fs::read_to_string(&pipeline).expect("pipeline");
+    std::fs::write(&pipeline, format!("{text}\n{table}")).expect("pipeline");
+    let after = run_pipeline(&pipeline, &folder.path().join("after"), &[0, 3]);
+    let error = |summary| number(summary, "/fit/holdout/fitted_mm/mean");
+    println!("{table}\nheld out {:.3} -> {:.3} mm", error(&before), error(&after));
+    assert!(error(&after) < 0.5 * error(&before));
 }

@@ -1,4 +1,3 @@
-use armcal::score::nominal_model;
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
 use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, Verdict, diagnose};
 use armcal_lab::config::{RecordingConfig, StopConfig, TourConfig};
@@ -6,6 +5,7 @@ use armcal_lab::scenario::{Design, Scenario, Size};
 use armcal_lab::{LabConfig, observe};
 use armcal_model::Session;
 use armcal_plan::{Allowed, Known, Place, Proposal, Tracking, propose, standing};
+use armcal_score::nominal_model;
 use armcal_table::Board;
 use nalgebra::Matrix3;
 use std::path::Path;

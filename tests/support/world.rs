@@ -265,7 +265,6 @@ pub fn cases() -> Vec<Case> {
         of(["simulate", "out"], "--out", &["simulate", "--hide", "backlash"], vec![], folder(&hidden)),
         of(["init", "out"], "--out", &init, vec!["normal.mcap", "board.toml", "arm.toml"], Place::File),
         of(["extract", "out"], "--out", &thin, vec!["normal.mcap", "p.toml"], Place::File),
-        of(["score", "page"], "--page", &["score", "nothing", "--seeds", "1"], vec![], Place::File),
         of(["man", "folder"], "", &["man"], vec![], folder(&["armcal.1", "armcal-run.1"])),
         of(["export", "out"], "--out", &["export", "p.toml"], with(&[]), Place::File),
     ]
@@ -373,7 +372,6 @@ pub fn printing() -> Vec<Vec<&'static str>> {
         vec!["compensate", "result", "targets.csv"],
         vec!["write", "result", "--as", "sdf"],
         vec!["view", "p.toml"],
-        vec!["score", "nothing", "--seeds", "1"],
         vec!["simulate", "--hide", "nothing"],
         vec!["extract", "normal.mcap", "--topic", "*", "--out", "thin.mcap"],
         vec!["export", "p.toml"],

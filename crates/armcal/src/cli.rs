@@ -1,6 +1,6 @@
 //! Everything a user can type.
 
-use crate::commands::{add, check, compensate, extract, init, plan, score, write};
+use crate::commands::{add, check, compensate, extract, init, plan, write};
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use std::path::PathBuf;
@@ -200,8 +200,6 @@ pub enum Command {
         #[arg(long, default_value_t = 0)]
         port: u16,
     },
-    /// How often the diagnosis is right: sealed scenarios, diagnosed without their truth, then judged by it.
-    Score(score::Request),
     /// The simulated rig: recordings with known errors, and their truth in a separate file.
     Simulate {
         /// LAB.toml: a rig described by hand.

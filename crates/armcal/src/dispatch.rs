@@ -3,7 +3,7 @@
 use crate::cli::{Cli, Command};
 use crate::commands::{
     Outcome, add, batch, check, compare, compensate, completions, diagnose, effects, export, extract, init,
-    inspect, man, plan, pool, run, score, simulate, transfer, verify, view, write,
+    inspect, man, plan, pool, run, simulate, transfer, verify, view, write,
 };
 use crate::error::Error;
 use crate::stdout::tell;
@@ -63,7 +63,6 @@ fn command(cli: &Cli) -> Result<Outcome, Error> {
         Command::Diagnose { input, json } => diagnose::run(input, *json),
         Command::Add(asked) => add::run(asked),
         Command::Effects { name, json } => effects::run(name.as_deref(), *json),
-        Command::Score(asked) => score::run(asked),
         Command::Plan(asked) => plan::run(asked),
         Command::Pool { pipeline, results, out, verbose, json } => {
             pool::run(pipeline, results, out, detail(*verbose), *json)

@@ -110,7 +110,6 @@ pub enum Error {
 armcal_stages::stopped_as_run!(
     Error:
     armcal_config::ConfigError,
-    armcal_table::TableError,
     armcal_model::ModelError,
     armcal_calibrate::CalibrateError,
     armcal_diagnose::DiagnoseError

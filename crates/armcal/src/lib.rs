@@ -10,7 +10,6 @@ pub mod dispatch;
 pub mod error;
 pub mod extended;
 pub mod progress;
-pub mod score;
 pub mod stdout;
 pub mod threads;
 pub mod view;

@@ -20,6 +20,7 @@ use crate::config::{LabConfig, parse, value};
 use crate::random::{Purpose, Stream};
 use crate::{LabError, Observed, observe};
 use families::Draw;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -164,6 +165,15 @@ pub fn check_family(words: &str) -> Result<(), LabError> {
         Some(name) => Err(unknown(name)),
         None => Ok(()),
     }
+}
+
+/// A design or a size by its word.
+///
+/// # Errors
+/// A word that is none, with those that are.
+pub fn word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, LabError> {
+    let parsed = serde_json::from_value(serde_json::Value::String(text.to_owned()));
+    parsed.map_err(|e| LabError::Value { key: key.to_owned(), why: e.to_string() })
 }
 
 fn family(name: &str) -> Option<&'static families::Family> {

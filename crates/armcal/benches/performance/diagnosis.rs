@@ -2,8 +2,8 @@
 
 use crate::page::{Bar, Section, Table, seconds};
 use crate::{Options, Result};
-use armcal::score::quick;
 use armcal_lab::scenario::{Design, Scenario};
+use armcal_score::quick;
 
 const HIDDEN: [&str; 5] = ["nothing", "backlash", "eccentricity", "frame_shift@dwell", "outside:cable_drag"];
 

@@ -3,11 +3,11 @@
 //! Written twice, as JSON for scipy and as plain numbers for Ceres; the cost at anybody's answer is judged by one function.
 
 use crate::Result;
-use armcal::score::nominal_model;
 use armcal_calibrate::{FitConfig, Objective, WhitenedProblem, position_covariance_m2, whitened_problem};
 use armcal_core::{Observation, Parameter};
 use armcal_lab::scenario::{Design, Scenario};
 use armcal_model::Model;
+use armcal_score::nominal_model;
 use nalgebra::{DVector, Matrix3};
 use serde_json::{Value, json};
 use std::fmt::Write as _;

@@ -146,7 +146,7 @@ pub fn page(sections: &[Section], options: &Options) -> String {
     let about = "Written by `cargo bench -p armcal --bench performance`; do not edit. Every number is of one run, where a part does not say otherwise, armcal \
                  and its peers taking turns on the same machine. CPU is time on a processor, of all threads: where wall \
                  time is longer, the machine was busy with something else. How often hidden effects are named rightly, and how \
-                 often nothing is claimed where nothing is hidden, is counted by `armcal score` (`docs/confusion.md`).";
+                 often nothing is claimed where nothing is hidden, is counted by `armcal-dev score` (`docs/confusion.md`).";
     text += &wrapped(about);
     text += "\n";
     for fact in machine::facts(options) {

@@ -16,7 +16,6 @@ pub(crate) mod man;
 pub mod plan;
 pub(crate) mod pool;
 pub(crate) mod run;
-pub mod score;
 pub(crate) mod simulate;
 pub(crate) mod transfer;
 pub(crate) mod verify;

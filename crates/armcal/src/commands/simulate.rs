@@ -1,11 +1,10 @@
 //! `armcal simulate`: the virtual rig.
 
-use super::score::{known_families, word};
 use super::{Outcome, print};
 use crate::error::Error;
 use armcal_config::read_text;
 use armcal_lab::pair::{self, PairConfig};
-use armcal_lab::scenario::{Scenario, seal};
+use armcal_lab::scenario::{Scenario, check_family, seal, word};
 use armcal_lab::{LabConfig, simulate};
 use armcal_recording::input::Kind;
 use std::path::{Path, PathBuf};
@@ -31,9 +30,10 @@ pub fn run(lab: Option<&Path>, out: &Path, seed: Option<u64>) -> Result<Outcome,
 
 /// Draws a rig that hides `family`, and writes what the product may see to `out` and the truth beside it.
 pub fn hide(family: &str, design: &str, size: &str, out: &Path, seed: u64) -> Result<Outcome, Error> {
-    known_families(family)?;
-    let size = word("size", size)?;
-    let scenario = Scenario { size, ..Scenario::new(family, word("design", design)?, seed) };
+    check_family(family).map_err(Error::of_usage)?;
+    let size = word("size", size).map_err(Error::of_usage)?;
+    let design = word("design", design).map_err(Error::of_usage)?;
+    let scenario = Scenario { size, ..Scenario::new(family, design, seed) };
     let mut truth = out.as_os_str().to_owned();
     truth.push("-truth.json");
     let sealed = seal(&scenario, out, Path::new(&truth))?;

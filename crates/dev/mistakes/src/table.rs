@@ -50,7 +50,7 @@ pub fn markdown(cases: &[Case], sound: &[Sound], command: &str) -> String {
         "# Setup mistakes\n\nMade by `{command}`; not edited by hand.\n\n\
          Each row is one mistake made in a sound session of a simulated rig: in the messages of its recordings, in their bytes, or in \
          the text of pipeline, board or arm. What makes them knows nothing of the checks; `armcal run` is judged by its exit code, \
-         `summary.json` and error message alone, by the table of causes in `crates/mistakes/src/causes.rs`. Rigs: `table` (three axes, \
+         `summary.json` and error message alone, by the table of causes in `crates/dev/mistakes/src/causes.rs`. Rigs: `table` (three axes, \
          calibration table, Vicon), `sockets` (the same, encoders only), `poses` (six axes, tracked 6-DoF target).\n\n\
          *False* is: exit 0 without the cause where the held-out error is above {SHOWN} times what the declared noise gives; a physical effect named \
          alone; `nothing_missing` above {NOTHING} times the floor; a run that does not end. *Not shown*: the error stays within \

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The small rig that the fixtures come from.
-const SMALL: &str = include_str!("../../../../pipelines/lab/paper-small.toml");
+const SMALL: &str = include_str!("../../../../../pipelines/lab/paper-small.toml");
 
 /// The small rig of a seed: one pass over the cavities in each of three tilts, twelve free poses.
 pub fn small_lab(seed: u64) -> Result<LabConfig, Error> {

@@ -1,10 +1,13 @@
-//! How often the diagnosis is right: many scenarios whose truth only this module reads.
+//! How often the diagnosis is right: many scenarios whose truth only this crate reads.
 //!
 //! `Scenario -> case (calibrated and diagnosed without the truth) -> judge (with it) -> table, page`. The quick way hands the
 //! observations over as the pipeline would have made them; the sealed way writes recordings to disk and runs the whole
 //! pipeline on them. `Scenario -> laws` asks what must hold of every answer, whatever is true.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod case;
+mod error;
 mod interval;
 mod judge;
 mod laws;
@@ -14,13 +17,13 @@ mod reliability;
 mod table;
 
 pub use case::{Answer, nominal_model, quick, sealed};
+pub use error::ScoreError;
 pub use judge::{Judgement, judge};
 pub use laws::{Laws, laws};
 pub use page::{Campaign, page};
 pub use reliability::Reliability;
 pub use table::{Row, rows, table};
 
-use crate::error::Error;
 use armcal_diagnose::NOT_LISTED;
 use armcal_lab::scenario::{Hidden, Scenario};
 use rayon::prelude::*;
@@ -52,7 +55,7 @@ pub enum Way {
 }
 
 /// Runs scenarios in parallel, in their order; `done` is told of each one.
-pub fn score(scenarios: &[Scenario], way: Way, done: &(dyn Fn() + Sync)) -> Result<Vec<Scored>, Error> {
+pub fn score(scenarios: &[Scenario], way: Way, done: &(dyn Fn() + Sync)) -> Result<Vec<Scored>, ScoreError> {
     scenarios
         .par_iter()
         .map(|scenario| {

@@ -149,7 +149,7 @@ fn same_effect(truth: &str, name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{Judgement, judge, same_effect};
-    use crate::score::page::tests::scored;
+    use crate::page::tests::scored;
     use armcal_diagnose::{NOT_LISTED, Verdict};
 
     /// A smooth displacement has no name: what is told of it, at 1.2 and at 2 floors, and how right that is.

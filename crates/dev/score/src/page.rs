@@ -202,7 +202,7 @@ fn misses(campaign: &Campaign<'_>) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::{Campaign, page};
-    use crate::score::{Answer, Judgement, Scored};
+    use crate::{Answer, Judgement, Scored};
     use armcal_diagnose::Verdict;
     use armcal_lab::scenario::{Design, Hidden, Scenario};
 

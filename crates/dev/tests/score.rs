@@ -1,12 +1,24 @@
-use crate::support::{armcal, number, run_pipeline};
+//! How often is the diagnosis right on scenarios whose truth it cannot see, and does every answer obey the laws of the verdict?
+
+#![allow(clippy::print_stdout, reason = "a test says what it measured")]
+
 use serde_json::Value;
 use std::ffi::OsStr;
-use std::process::Command;
+use std::process::{Command, Output};
+
+fn score<S: AsRef<OsStr>>(args: impl IntoIterator<Item = S>) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_armcal-dev"));
+    command.arg("score").args(args).output().expect("starting armcal-dev")
+}
+
+fn number(value: &Value, pointer: &str) -> f64 {
+    value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no number at {pointer}"))
+}
 
 /// Scenarios scored by the program itself, on seeds nobody looked at while the rules were made. The truth is read by
 /// the scorer alone, after the answer.
 fn scored(args: &[&str]) -> Vec<Value> {
-    let output = armcal(["score", "--json", "--from", "7001"].into_iter().chain(args.iter().copied()));
+    let output = score(["--json", "--from", "7001"].iter().chain(args));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let all = report["scenarios"].as_array().expect("scenarios").clone();
@@ -107,42 +119,14 @@ fn recordings_on_disk_are_diagnosed_as_observations_are() {
     assert_eq!(count(&all, &["first", "rightly_silent"]), all.len());
 }
 
-/// What the page and the terminal offer to paste is all that is needed: pasted by hand, the error falls.
-#[test]
-fn the_pasted_table_of_something_unlisted_removes_most_of_the_error() {
-    let folder = tempfile::tempdir().expect("temporary folder");
-    let lab = folder.path().join("lab");
-    let made = armcal(
-        ["simulate", "--hide", "outside:twist", "--seed", "7001", "--out"]
-            .map(OsStr::new)
-            .into_iter()
-            .chain([lab.as_os_str()]),
-    );
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    let pipeline = lab.join("pipeline.toml");
-    let before = run_pipeline(&pipeline, &folder.path().join("before"), &[0, 3]);
-    let table = before["diagnosis"]["unknown"]["table"].as_str().expect("a table to paste");
-    let text = std::fs::read_to_string(&pipeline).expect("pipeline");
-    std::fs::write(&pipeline, format!("{text}\n{table}")).expect("pipeline");
-    let after = run_pipeline(&pipeline, &folder.path().join("after"), &[0, 3]);
-    let error = |summary| number(summary, "/fit/holdout/fitted_mm/mean");
-    println!("{table}\nheld out {:.3} -> {:.3} mm", error(&before), error(&after));
-    assert!(error(&after) < 0.5 * error(&before));
-}
-
 /// docs/confusion.md in small: the page says what was answered, scenario by scenario, and how to make it again.
 #[test]
 fn the_page_of_scores_says_what_was_answered() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let file = folder.path().join("confusion.md");
     let words = "gear_ratio gravity_backlash outside:twist nothing:white backlash+eccentricity --seeds 1 --from 7001 --sealed-seeds 1";
-    let output = armcal(
-        ["score", "--json", "--page"]
-            .map(OsStr::new)
-            .into_iter()
-            .chain([file.as_os_str()])
-            .chain(words.split(' ').map(OsStr::new)),
-    );
+    let page = ["--json".as_ref(), "--page".as_ref(), file.as_os_str()];
+    let output = score(page.into_iter().chain(words.split(' ').map(OsStr::new)));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let scenarios = |key: &str| report[key].as_array().expect("scenarios").clone();
@@ -154,7 +138,9 @@ fn the_page_of_scores_says_what_was_answered() {
     assert!(
         text.contains(&format!("Written in one go by armcal {version}: 7 scenarios, seeds 7001 to 7001.\n"))
     );
-    assert!(text.contains(&format!("```sh\narmcal score {words} --page docs/confusion.md\n```\n")));
+    assert!(text.contains(&format!(
+        "```sh\ncargo run --release -p armcal-dev -- score {words} --page docs/confusion.md\n```\n"
+    )));
 
     let all: Vec<&Value> = quick.iter().chain(&whole).collect();
     let right = ["rightly_silent", "first", "in_set", "placed", "nearest", "not_shown"];
@@ -181,14 +167,51 @@ fn the_page_of_scores_is_the_same_on_any_number_of_threads() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let page = |threads: &str| {
         let file = folder.path().join(threads);
-        let output = Command::new(env!("CARGO_BIN_EXE_armcal"))
+        let output = Command::new(env!("CARGO_BIN_EXE_armcal-dev"))
             .args(["score", "gear_ratio", "gravity_backlash", "--seeds", "2", "--from", "7001", "--page"])
             .arg(&file)
             .env("RAYON_NUM_THREADS", threads)
             .output()
-            .expect("starting armcal");
+            .expect("starting armcal-dev");
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         std::fs::read_to_string(&file).expect("the page")
     };
     assert_eq!(page("1"), page("4"));
+}
+
+/// The laws that `armcal-dev score --laws` asks (docs/laws.md in full), of a few sessions on seeds of their own. All hold but one,
+/// which may be broken by chance: the set of half of the dwells holds that of all.
+#[test]
+fn what_must_hold_of_every_answer_holds() {
+    let families = ["backlash", "compliance", "zero_slip@dwell", "backlash+eccentricity", "nothing"];
+    let output = score(["--laws", "--seeds", "1", "--from", "8101"].into_iter().chain(families));
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut asked = 0;
+    for row in text.lines().filter(|line| line.contains(" of ") && line.starts_with("| ")) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let [held, of]: [usize; 2] = {
+            let numbers: Vec<usize> = cells[3].split(" of ").filter_map(|n| n.parse().ok()).collect();
+            numbers.try_into().expect("k of n")
+        };
+        let may_break = usize::from(cells[1] == "less holds more");
+        assert!(of > 0 && held + may_break >= of, "{text}");
+        asked += 1;
+    }
+    assert_eq!(asked, 7, "{text}");
+}
+
+/// A name that the command line gets wrong is a mistake of usage, told with the nearest name.
+#[test]
+fn names_that_do_not_exist_are_usage_errors_with_the_nearest_name() {
+    for (arguments, says) in [
+        (&["nothing", "bcklash"][..], "did you mean `backlash`?"),
+        (&["nothing", "--design", "free-pose"], "free-poses"),
+        (&["backlash+gear_rato"], "did you mean `gear_ratio`?"),
+    ] {
+        let output = score(arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.starts_with("error: ") && said.contains(says), "{said}");
+    }
 }

@@ -1,21 +1,19 @@
-//! `armcal-mistakes`: runs armcal on setup mistakes and on sound sessions, and writes the table of what it said.
+//! `armcal-dev mistakes`: runs armcal on setup mistakes and on sound sessions, and writes the table of what it said.
 
+use crate::say;
 use armcal_mistakes::judge::{self, Case};
 use armcal_mistakes::sound::{self, Sound};
 use armcal_mistakes::table::{Counts, markdown};
-use armcal_mistakes::{Error, Kind, Rig, kinds, run};
-use clap::Parser;
+use armcal_mistakes::{Error, Kind, Rig, kinds, run::beside_this};
+use clap::Args;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Runs armcal on setup mistakes and on sound sessions, judges what it says by its outputs alone, and writes the table.
-///
-/// Exit codes: 0 nothing false was said, 1 the suite itself failed, 3 something false was said, or a sound session accused.
-#[derive(Debug, Parser)]
-#[command(name = "armcal-mistakes", version)]
-struct Args {
+/// Which mistakes, on which rigs.
+#[derive(Debug, Args)]
+pub struct Request {
     /// Seed of all rigs and mistakes.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -60,17 +58,8 @@ struct Args {
     list: bool,
 }
 
-fn main() -> ExitCode {
-    match suite(&Args::parse()) {
-        Ok(code) => code,
-        Err(error) => {
-            say(&format!("error: {error}"));
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn suite(args: &Args) -> Result<ExitCode, Error> {
+/// Runs the suite and writes what came of it.
+pub fn run(args: &Request) -> Result<ExitCode, Error> {
     let (kinds, rigs) = (chosen(args)?, rigs(args)?);
     if args.list {
         for kind in kinds {
@@ -85,7 +74,7 @@ fn suite(args: &Args) -> Result<ExitCode, Error> {
         let sound: Vec<Sound> = sound.into_iter().map(Sound::judged_again).collect();
         return report(args, &cases, &sound);
     }
-    let armcal = args.armcal.clone().or_else(run::beside_this).unwrap_or_else(|| "armcal".into());
+    let armcal = args.armcal.clone().or_else(beside_this).unwrap_or_else(|| "armcal".into());
     let wanted: Vec<(&Kind, Rig, u64)> = (args.seed..args.seed + args.seeds)
         .flat_map(|seed| rigs.iter().map(move |rig| (*rig, seed)))
         .flat_map(|(rig, seed)| {
@@ -129,9 +118,9 @@ fn suite(args: &Args) -> Result<ExitCode, Error> {
     report(args, &cases, &sound)
 }
 
-fn report(args: &Args, cases: &[Case], sound: &[Sound]) -> Result<ExitCode, Error> {
+fn report(args: &Request, cases: &[Case], sound: &[Sound]) -> Result<ExitCode, Error> {
     let command = format!(
-        "cargo run -p armcal-mistakes -- --seed {} --seeds {} --sound {}",
+        "cargo run --release -p armcal-dev -- mistakes --seed {} --seeds {} --sound {}",
         args.seed, args.seeds, args.sound
     );
     let text = markdown(cases, sound, &command);
@@ -173,7 +162,7 @@ fn written(path: &Path) -> Result<Written, Error> {
     })
 }
 
-fn chosen(args: &Args) -> Result<Vec<Kind>, Error> {
+fn chosen(args: &Request) -> Result<Vec<Kind>, Error> {
     if !args.only.is_empty() {
         return args.only.iter().map(|name| kinds::named(name)).collect();
     }
@@ -182,7 +171,7 @@ fn chosen(args: &Args) -> Result<Vec<Kind>, Error> {
     Ok((0..n).map(|i| all[i * all.len() / n]).collect())
 }
 
-fn rigs(args: &Args) -> Result<Vec<Rig>, Error> {
+fn rigs(args: &Request) -> Result<Vec<Rig>, Error> {
     match args.rigs.is_empty() {
         true => Ok(Rig::ALL.to_vec()),
         false => args.rigs.iter().map(|word| Rig::named(word)).collect(),
@@ -218,9 +207,4 @@ impl Progress {
 #[expect(clippy::print_stdout, reason = "the result of the command")]
 fn print(text: &str) {
     print!("{text}");
-}
-
-#[expect(clippy::print_stderr, reason = "progress and errors of the command")]
-fn say(line: &str) {
-    eprintln!("{line}");
 }

@@ -1,7 +1,6 @@
 //! One scenario through the tool: what it says, what its suggestion does to held-out points, and the truth to judge by.
 
-use crate::error::Error;
-use crate::progress::Progress;
+use crate::error::ScoreError;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_config::{ConfigError, Pipeline};
 use armcal_core::Observation;
@@ -10,6 +9,7 @@ use armcal_lab::scenario::{Hidden, Scenario, seal};
 use armcal_lab::{LabError, Nominal, Truth};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Knowledge, Model, Session};
 use armcal_recording::input;
+use armcal_stages::Silent;
 use serde::Serialize;
 use std::path::Path;
 
@@ -50,7 +50,7 @@ pub struct Answer {
 }
 
 /// The observations handed over as the pipeline would have made them, their noise declared so many times as large.
-pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidden>), Error> {
+pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidden>), ScoreError> {
     let observed = scenario.observe()?.declaring(noise_factor);
     let (answer, _) = diagnosed(&observed.nominal, &observed.observations)?;
     Ok((answer, observed.truth.hidden))
@@ -60,7 +60,7 @@ pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidd
 pub(super) fn diagnosed(
     nominal: &Nominal,
     observations: &[Observation],
-) -> Result<(Answer, Diagnosis), Error> {
+) -> Result<(Answer, Diagnosis), ScoreError> {
     let model = nominal_model(nominal)?;
     let (fit, session) = (FitConfig::default(), Session::of(observations));
     let holdout = match observations.iter().any(|o| o.cavity().is_some()) {
@@ -86,31 +86,30 @@ pub(super) fn diagnosed(
 }
 
 /// Recordings on disk and the whole pipeline; the truth lies in another folder and is read last.
-pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Error> {
+pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), ScoreError> {
     let folder = |source| LabError::Folder { path: std::env::temp_dir(), source };
     let (open, closed) = (tempfile::tempdir().map_err(folder)?, tempfile::tempdir().map_err(folder)?);
     let place = seal(scenario, open.path(), &closed.path().join("truth.json"))?;
     let pipeline = Pipeline::load(&place.pipeline)?;
-    let progress = Progress::silent();
-    let settled = armcal_pipeline::settle(&pipeline, &progress)?;
+    let settled = armcal_pipeline::settle(&pipeline, &Silent)?;
     let begin = std::time::Instant::now();
-    let diagnosis = settled.diagnose(&pipeline, &progress)?.ok_or(Error::NotDiagnosed)?;
+    let diagnosis = settled.diagnose(&pipeline, &Silent)?.ok_or(ScoreError::NotDiagnosed)?;
     let seconds = begin.elapsed().as_secs_f64();
     let of_geometry = Calibrated { model: &settled.fitted.geometry, ..settled.fitted.calibrated(&pipeline) };
     Ok((Answer { seconds, ..answer(&diagnosis, &of_geometry)? }, truth(&place.truth)?.hidden))
 }
 
-fn truth(path: &Path) -> Result<Truth, Error> {
+fn truth(path: &Path) -> Result<Truth, ScoreError> {
     let text = input::read_to_string(path, input::Kind::Data).map_err(|source| ConfigError::ReadFile {
         what: "truth",
         path: path.to_owned(),
         source,
     })?;
-    serde_json::from_str(&text).map_err(Error::Json)
+    serde_json::from_str(&text).map_err(ScoreError::Json)
 }
 
 /// The answer to a diagnosis, and what its suggestion does to the held-out points.
-fn answer(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Result<Answer, Error> {
+fn answer(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Result<Answer, ScoreError> {
     let Calibrated { model, calibration: before, observations, session, fit, holdout } = calibrated;
     let suggested = diagnosis.suggested(model.chain().joint_names())?;
     let after = match suggested.is_empty() {
@@ -136,7 +135,7 @@ fn answer(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Result<Answer, 
 }
 
 /// The model that a pipeline would start from.
-pub fn nominal_model(nominal: &Nominal) -> Result<Model, Error> {
+pub fn nominal_model(nominal: &Nominal) -> Result<Model, ScoreError> {
     let frame =
         |name: &str, pose, knowledge| Frame { name: name.into(), pose, knowledge, free_rotation: false };
     let (sigma_m, sigma_rad) = (nominal.base_sigma_m, nominal.base_sigma_rad);

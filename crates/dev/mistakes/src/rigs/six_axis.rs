@@ -15,7 +15,7 @@ use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 /// The manufacturer's table, as shipped.
-const ARM: &str = include_str!("../../../../pipelines/models/ur10.toml");
+const ARM: &str = include_str!("../../../../../pipelines/models/ur10.toml");
 
 /// Names of the joints.
 pub const NAMES: [&str; 6] = [

@@ -1,14 +1,13 @@
-//! `armcal score`: how often the diagnosis is right on sealed scenarios.
+//! `armcal-dev score`: how often the diagnosis is right on sealed scenarios.
 
-use super::{Outcome, may_write, print};
 use crate::error::Error;
-use crate::progress::Progress;
-use crate::score::{Campaign, Judgement, Reliability, Way, laws, page, rows, score, table};
+use armcal::progress::Progress;
+use armcal::stdout::{print, print_json};
 use armcal_lab::LabError;
-use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside, pairs};
-use armcal_recording::atomic;
+use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside, pairs, word};
+use armcal_recording::{atomic, may_write_all};
+use armcal_score::{Campaign, Judgement, Reliability, Way, laws, page, rows, score, table};
 use clap::Args;
-use serde::de::DeserializeOwned;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -52,9 +51,10 @@ pub struct Request {
 }
 
 /// Runs the scenarios and prints the confusion table.
-pub fn run(request: &Request) -> Result<Outcome, Error> {
+pub fn run(request: &Request) -> Result<(), Error> {
+    armcal::threads::start()?;
     let scenarios = scenarios(request)?;
-    may_write(&request.page)?;
+    may_write_all(&request.page).map_err(Error::Output)?;
     let whole_way = whole_way(request, &scenarios);
     let progress = Progress::new();
     let (finished, all) = (AtomicUsize::new(0), scenarios.len() + whole_way.len());
@@ -69,8 +69,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         if let Some(file) = &request.page {
             atomic::write(file, text.as_bytes()).map_err(Error::Output)?;
         }
-        print(&text)?;
-        return Ok(Outcome::Done);
+        return Ok(print(&text)?);
     }
     let noise_factor = request.noise_factor;
     let way = if request.sealed { Way::Recorded } else { Way::Observed { noise_factor } };
@@ -85,7 +84,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let rows = rows(&scored);
     if request.json {
         let all = json!({ "rows": rows, "scenarios": scored, "whole_way": whole_way });
-        print(&super::json_text(&all)?)?;
+        print_json(&all)?;
     } else {
         print(&table(&rows))?;
         let wrong = scored.iter().filter(|s| s.judgement == Judgement::Wrong).count();
@@ -98,13 +97,13 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
             Reliability::of(scored.iter()).claim(),
         ))?;
     }
-    Ok(Outcome::Done)
+    Ok(())
 }
 
 fn scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
     if !(request.noise_factor > 0.0 && request.noise_factor.is_finite()) {
         let why = format!("must be positive, is {}", request.noise_factor);
-        return Err(Error::of_usage(LabError::Value { key: "noise-factor".to_owned(), why }));
+        return Err(Error::Usage(LabError::Value { key: "noise-factor".to_owned(), why }));
     }
     let mut names: Vec<String> = Vec::new();
     for word in &request.families {
@@ -114,15 +113,15 @@ fn scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
             "pairs" => names.extend(pairs().into_iter().map(str::to_owned)),
             "outside" => names.extend(outside().into_iter().map(str::to_owned)),
             name => {
-                known_families(name)?;
+                check_family(name).map_err(Error::Usage)?;
                 names.push(name.to_owned());
             }
         }
     }
-    let size: Size = word("size", &request.size)?;
+    let size: Size = word("size", &request.size).map_err(Error::Usage)?;
     let mut all = Vec::new();
     for design in &request.designs {
-        let design: Design = word("design", design)?;
+        let design: Design = word("design", design).map_err(Error::Usage)?;
         for name in &names {
             for seed in request.from..request.from + request.seeds {
                 all.push(Scenario { size, ..Scenario::new(name, design, seed) });
@@ -142,7 +141,7 @@ fn whole_way(request: &Request, scenarios: &[Scenario]) -> Vec<Scenario> {
 
 /// The command that makes the page again.
 fn command(request: &Request) -> String {
-    let mut words = vec!["armcal".to_owned(), "score".to_owned()];
+    let mut words = vec!["cargo run --release -p armcal-dev -- score".to_owned()];
     words.extend(request.families.iter().cloned());
     if request.designs != ["free-poses"] {
         words.extend(request.designs.iter().map(|design| format!("--design {design}")));
@@ -165,15 +164,4 @@ fn command(request: &Request) -> String {
         if request.laws { "--laws --page docs/laws.md" } else { "--page docs/confusion.md" }.to_owned(),
     );
     words.join(" ")
-}
-
-/// A word of the laboratory's own vocabulary.
-pub(super) fn word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, Error> {
-    let parsed = serde_json::from_value(serde_json::Value::String(text.to_owned()));
-    parsed.map_err(|e| Error::of_usage(LabError::Value { key: key.to_owned(), why: e.to_string() }))
-}
-
-/// A family that can be hidden, or several joined by `+`; otherwise the mistake is the user's.
-pub(super) fn known_families(words: &str) -> Result<(), Error> {
-    check_family(words).map_err(Error::of_usage)
 }

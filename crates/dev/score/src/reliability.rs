@@ -65,8 +65,8 @@ impl Reliability {
 #[cfg(test)]
 mod tests {
     use super::{FROM, Reliability, Share};
-    use crate::score::page::tests::scored;
-    use crate::score::{Judgement, Scored};
+    use crate::page::tests::scored;
+    use crate::{Judgement, Scored};
 
     /// One true name and one wrong one, told with this probability.
     fn told(probability: f64) -> Scored {

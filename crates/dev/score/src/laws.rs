@@ -6,7 +6,7 @@
 use super::case::diagnosed;
 use super::interval::Share;
 use super::{Answer, NOT_LISTED};
-use crate::error::Error;
+use crate::error::ScoreError;
 use armcal_core::{DwellId, Observation};
 use armcal_diagnose::{Diagnosis, DiagnosisConfig, Verdict, is_clear};
 use armcal_lab::scenario::Scenario;
@@ -94,17 +94,17 @@ impl Laws {
 }
 
 /// Asks every law of scenarios, in parallel; `done` is told of each one.
-pub fn laws(scenarios: &[Scenario], done: &(dyn Fn() + Sync)) -> Result<Laws, Error> {
+pub fn laws(scenarios: &[Scenario], done: &(dyn Fn() + Sync)) -> Result<Laws, ScoreError> {
     let of = |scenario: &Scenario| {
         let laws = of_one(scenario)?;
         done();
         Ok(laws)
     };
-    let all = scenarios.par_iter().map(of).collect::<Result<Vec<Laws>, Error>>()?;
+    let all = scenarios.par_iter().map(of).collect::<Result<Vec<Laws>, ScoreError>>()?;
     Ok(all.into_iter().fold(Laws::default(), Laws::and))
 }
 
-fn of_one(scenario: &Scenario) -> Result<Laws, Error> {
+fn of_one(scenario: &Scenario) -> Result<Laws, ScoreError> {
     let seen = scenario.observe()?;
     let name = format!("`{}`, seed {}", scenario.family, scenario.seed);
     let mut laws = Laws::default();
