@@ -110,7 +110,7 @@ fn modules(source: &Path) -> Vec<Uses> {
 }
 
 /// The module that a path leads into, items that are passed on followed to where they are.
-fn home(path: &[String], known: &BTreeMap<&Module, &BTreeMap<String, Module>>, depth: usize) -> Module {
+fn home(path: &[String], known: &BTreeMap<&Module, BTreeMap<String, Module>>, depth: usize) -> Module {
     let longest = (0..=path.len()).rev().find(|n| known.contains_key(&path[..*n].to_vec())).unwrap_or(0);
     let module = path[..longest].to_vec();
     let passed = path.get(longest).and_then(|item| known.get(&module)?.get(item));
@@ -123,9 +123,10 @@ fn home(path: &[String], known: &BTreeMap<&Module, &BTreeMap<String, Module>>, d
 /// Circles among the modules that are beside each other in one folder, of every folder of a crate.
 fn circles(name: &str) -> BTreeSet<String> {
     let all = modules(&root().join("crates").join(name).join("src"));
-    let mut known: BTreeMap<&Module, &BTreeMap<String, Module>> = BTreeMap::new();
+    let mut known: BTreeMap<&Module, BTreeMap<String, Module>> = BTreeMap::new();
     for uses in &all {
-        known.insert(&uses.module, &uses.passed_on);
+        // The root of a library and that of its program are one module.
+        known.entry(&uses.module).or_default().extend(uses.passed_on.clone());
     }
     let mut arrows: BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
     for uses in &all {

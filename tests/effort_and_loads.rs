@@ -1,9 +1,9 @@
 use crate::support::{paper_pipeline, quick_pipeline, read_json, root, run_pipeline, shipped};
-use armcal::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_core::FeatureId;
 use armcal_model::Masses;
 use armcal_recording::ros2::{Header, joint_state};
+use armcal_stages::Silent;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -162,7 +162,7 @@ fn a_joint_without_effort_costs_only_itself() {
     let with = |joint: usize| {
         let effect = format!("{text}\n[[effects]]\nkind = \"effort_compliance\"\ntarget = {joint}\n");
         let pipeline = parsed(effect, folder.path()).expect("a pipeline");
-        armcal_pipeline::settle(&pipeline, &Progress::silent())
+        armcal_pipeline::settle(&pipeline, &Silent)
     };
     let refused = with(3).map(|_| ()).expect_err("no effort").to_string();
     assert!(refused.contains("not all dwells have a measured effort of `joint3`"), "{refused}");
@@ -180,8 +180,7 @@ fn a_list_of_efforts_that_ends_early_is_of_the_joints_that_come_first() {
         let folder = tempfile::tempdir().expect("temporary folder");
         paper_with_efforts(folder.path(), third);
         let text = quick_pipeline(folder.path());
-        let settled =
-            armcal_pipeline::settle(&parsed(text, folder.path()).expect("a pipeline"), &Progress::silent());
+        let settled = armcal_pipeline::settle(&parsed(text, folder.path()).expect("a pipeline"), &Silent);
         serde_json::to_string(&settled.expect("a calibration").fitted.observations).expect("JSON")
     };
     let short = observed(&|_| ());
@@ -274,7 +273,7 @@ fn a_load_at_the_other_arms_tip_is_what_its_spring_feels() {
     let told = text.replace("paths = [\"second.mcap\"]", loads);
     let settled = |text: &str| {
         let pipeline = parsed(text.to_owned(), folder.path()).expect("a pipeline");
-        armcal_pipeline::settle(&pipeline, &Progress::silent()).expect("a calibration").fitted
+        armcal_pipeline::settle(&pipeline, &Silent).expect("a calibration").fitted
     };
     let (told, untold) = (settled(&told), settled(&text));
     for o in &told.observations {

@@ -4,11 +4,11 @@
 //! `cargo bench -p armcal --bench before`; here it may come from the processor.
 
 use crate::support::root;
-use armcal::progress::Progress;
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_config::Pipeline;
 use armcal_lab::scenario::{Design, Scenario};
 use armcal_score::nominal_model;
+use armcal_stages::Silent;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -72,9 +72,7 @@ impl Golden {
 fn of_pipeline(name: &str) -> Golden {
     let path = root().join("pipelines").join(name).with_extension("toml");
     let pipeline = Pipeline::load(&path).expect("a shipped pipeline");
-    Golden::of(
-        &armcal_pipeline::settle(&pipeline, &Progress::silent()).expect("a calibration").fitted.calibration,
-    )
+    Golden::of(&armcal_pipeline::settle(&pipeline, &Silent).expect("a calibration").fitted.calibration)
 }
 
 fn of_rig(scenario: &Scenario) -> Golden {

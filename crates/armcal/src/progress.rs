@@ -26,11 +26,6 @@ impl Progress {
         Progress { bar }
     }
 
-    /// Says nothing.
-    pub fn silent() -> Progress {
-        Progress { bar: ProgressBar::hidden() }
-    }
-
     /// Says what begins now.
     pub fn step(&self, what: &str) {
         self.bar.set_message(what.to_owned());

@@ -1,8 +1,8 @@
 //! A pipeline from its file to its results in memory: nothing is printed, nothing is written.
 //!
 //! [`run`] is all of it: [`settle`] reads, fits and looks for mistakes of the setup, the diagnosis looks for what the model
-//! is missing, the refits show what it would become. [`pool`] is the same of results
-//! of many runs, without their recordings.
+//! is missing, the refits show what it would become. [`pool`] is the same of the
+//! results of many runs, without their recordings.
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 

@@ -5,11 +5,11 @@ use crate::clock::{Spent, spent};
 use crate::page::{Section, Table};
 use crate::walk::walk;
 use crate::{Options, Result, batch, campaign};
-use armcal::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_pipeline::add_refits;
 use armcal_report::write_all;
 use armcal_setup as setup;
+use armcal_stages::Silent;
 use armcal_stages::{frames, perceive};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ pub fn section(options: &Options) -> Result<Section> {
 
 /// Stage by stage, as `armcal run` goes through them.
 fn costs(title: String, pipeline: &Path) -> Result<Costs> {
-    let (pipeline, silent) = (Pipeline::load(pipeline)?, Progress::silent());
+    let (pipeline, silent) = (Pipeline::load(pipeline)?, Silent);
     let paths = pipeline.recordings.iter().flat_map(|entry| &entry.paths).map(|path| pipeline.resolve(path));
     let paths: Vec<PathBuf> = paths.collect();
     let (walked, walking) = spent(|| paths.iter().map(|path| walk(path, false)).collect::<Result<Vec<_>>>());

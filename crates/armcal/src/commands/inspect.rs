@@ -2,13 +2,12 @@
 
 use super::{Outcome, print};
 use crate::error::Error;
-use crate::progress::Progress;
 use armcal_config::{Pipeline, recording_name};
 use armcal_core::Severity;
 use armcal_core::printable;
 use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport, shortened};
 use armcal_report::RULED;
-use armcal_stages::{RunError, perceive};
+use armcal_stages::{RunError, Silent, perceive};
 use comfy_table::Table;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -54,7 +53,7 @@ struct Named<'a> {
 
 fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
     let pipeline = Pipeline::load(path)?;
-    let recordings = perceive::open_all(&pipeline, &Progress::silent())?;
+    let recordings = perceive::open_all(&pipeline, &Silent)?;
     let entries = pipeline.recordings.iter().zip(&recordings);
     entries
         .map(|(entry, recording)| {

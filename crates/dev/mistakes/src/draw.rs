@@ -1,6 +1,5 @@
 //! What a case draws: numbers of its own, whatever other cases there are.
 
-use crate::Rig;
 use armcal_lab::random::{Purpose, Stream};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -10,7 +9,7 @@ pub struct Draw(Stream);
 
 impl Draw {
     /// The numbers of the case `name` on `rig`.
-    pub fn new(seed: u64, name: &str, rig: Rig) -> Draw {
+    pub fn new(seed: u64, name: &str, rig: &str) -> Draw {
         Draw(Stream::new(mixed(seed, name, rig), Purpose::Scenario, 1))
     }
 
@@ -62,8 +61,8 @@ impl Draw {
 }
 
 /// A seed of the case's own (FNV-1a over its name), so that another list of cases leaves it as it is.
-pub fn mixed(seed: u64, name: &str, rig: Rig) -> u64 {
-    let bytes = seed.to_le_bytes().into_iter().chain(rig.word().bytes()).chain(name.bytes());
+pub fn mixed(seed: u64, name: &str, rig: &str) -> u64 {
+    let bytes = seed.to_le_bytes().into_iter().chain(rig.bytes()).chain(name.bytes());
     let hash = bytes
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
     // Below 2^53, so that a seed is the same number in JSON.

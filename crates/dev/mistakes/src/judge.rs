@@ -71,7 +71,7 @@ pub struct Case {
 /// Makes one mistake on one rig, runs the program on it in `folder`, and judges.
 pub fn case(armcal: &Path, kind: &Kind, rig: Rig, seed: u64, folder: &Path) -> Result<Case, Error> {
     let mut session = rig.session(seed, kind.name)?;
-    let about = kind.make(&mut session, &mut Draw::new(seed, kind.name, rig))?;
+    let about = kind.make(&mut session, &mut Draw::new(seed, kind.name, rig.word()))?;
     let said = run::run(armcal, &session, folder)?;
     let (reported, judgement) = judge(&said, kind.cause, &about);
     let (kind, cause) = (kind.name.to_owned(), kind.cause.to_owned());

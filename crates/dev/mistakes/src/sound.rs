@@ -49,11 +49,11 @@ impl Sound {
 fn session(number: usize, seed: u64) -> Result<(Rig, String, Session), Error> {
     let rig = Rig::ALL[number % 3];
     let case = format!("sound {number}");
-    let mut draw = Draw::new(seed, &case, rig);
+    let mut draw = Draw::new(seed, &case, rig.word());
     if (number / 3).is_multiple_of(2) {
         return Ok((rig, "nothing".to_owned(), rig.session(seed, &case)?));
     }
-    let seed = draw::mixed(seed, &case, rig);
+    let seed = draw::mixed(seed, &case, rig.word());
     if rig == Rig::Poses {
         let hidden = Hidden::draw(&mut draw);
         let lab = six_axis::Lab { hidden: Some(hidden), ..six_axis::Lab::new(seed) };

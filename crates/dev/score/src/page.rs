@@ -259,7 +259,7 @@ pub(super) mod tests {
             scored("nothing:smooth_10", 1, Judgement::Silent, &[]),
         ];
         let whole = [scored("backlash", 1, Judgement::First, &[&["backlash:2"]])];
-        let command = "armcal score all".to_owned();
+        let command = "armcal-dev score all".to_owned();
         let campaign = Campaign { command, scored: &all, whole_way: &whole, noise_factor: 0.1 };
         let text = page(&campaign);
         let sections: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
@@ -278,7 +278,7 @@ pub(super) mod tests {
         );
         let expected = [
             "Written in one go by armcal 0.1.0: 10 scenarios, seeds 1 to 2.",
-            "armcal score all",
+            "armcal-dev score all",
             "The noise of sensor, seats and encoders is declared 0.1 times as large as it is; no reading differs.",
             "| hidden | n | first | not shown | silent | wrong set | found (95 %) | before/floor | after/floor | at floor | removed |",
             "| `backlash` | 2 | 1 | 0 | 0 | 1 | 50.0 % (1.3 to 98.7) | 2.00 | 1.00 | 100 % | 100 % |",

@@ -144,7 +144,7 @@ mod tests {
             for kind in kinds().iter().filter(|kind| kind.rigs.contains(&rig)) {
                 let make = |seed| {
                     let mut session = sound.clone();
-                    let about = kind.make(&mut session, &mut Draw::new(seed, kind.name, rig)).unwrap();
+                    let about = kind.make(&mut session, &mut Draw::new(seed, kind.name, rig.word())).unwrap();
                     (session, about)
                 };
                 let (made, about) = make(5);

@@ -159,7 +159,7 @@ fn base_turned(session: &mut Session, draw: &mut Draw) {
 /// An arm that yields, half of its recordings with a load that nobody declared.
 fn load(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
     let Source::Lab(config) = &session.source else { return anything() };
-    let seed = draw::mixed(config.seed, "load", session.rig);
+    let seed = draw::mixed(config.seed, "load", session.rig.word());
     let scenario = Scenario { size: Size::Large, ..Scenario::new("compliance", Design::Load, seed) };
     let mut lab = scenario.plant()?.config;
     lab.recordings.truncate(4);

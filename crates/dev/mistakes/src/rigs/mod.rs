@@ -49,7 +49,7 @@ impl Rig {
 
     /// A sound session, of a rig and with noise of the case's own.
     pub fn session(self, seed: u64, case: &str) -> Result<Session, Error> {
-        let seed = draw::mixed(seed, case, self);
+        let seed = draw::mixed(seed, case, self.word());
         match self {
             Rig::Table | Rig::Sockets => session_of(self, small_lab(seed)?),
             Rig::Poses => six_axis::session(six_axis::Lab::new(seed)),
