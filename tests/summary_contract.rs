@@ -1,5 +1,7 @@
-use crate::support::{root, run_pipeline};
+use crate::support::{python_with, read_json, root, run_pipeline};
+use armcal_result::summary::summary_schema;
 use serde_json::Value;
+use std::process::Command;
 
 /// The contract of `summary.json`: every pointer must exist with this kind of value. Extending it is fine,
 /// renaming or dropping is not.
@@ -85,4 +87,70 @@ fn summary_keeps_its_contract() {
         all.iter().any(|p| p["name"] == name && p["unit"] == "rad")
     };
     assert!(named("joint2.theta"));
+}
+
+/// What validates summaries is what they are made of.
+#[test]
+fn the_schema_is_that_of_the_types() {
+    let path = root().join("docs/summary.schema.json");
+    let written = std::fs::read_to_string(&path).expect("the schema");
+    let made = format!("{:#}\n", summary_schema());
+    assert!(written == made, "run `cargo run -p armcal-dev -- schema > docs/summary.schema.json`");
+}
+
+/// The program `jsonschema` of Python judges summaries by the schema: those of all kinds of runs hold, and none that lost a field.
+#[test]
+fn summaries_hold_their_schema() {
+    let Some(python) = python_with("jsonschema") else { return };
+    let out = tempfile::tempdir().expect("temporary folder");
+    let mut summaries = Vec::new();
+    for name in ["paper", "two-arms"] {
+        let folder = out.path().join(name);
+        run_pipeline(&root().join(format!("pipelines/{name}.toml")), &folder, &[0, 3]);
+        summaries.push(folder.join("summary.json"));
+    }
+    let cut = out.path().join("cut.json");
+    let mut value = read_json(&summaries[0]);
+    value["fit"].as_object_mut().expect("a fit").remove("covariance");
+    std::fs::write(&cut, value.to_string()).expect("written");
+    let script = "import json, sys, jsonschema\n\
+                  schema = json.load(open(sys.argv[1]))\n\
+                  jsonschema.Draft202012Validator.check_schema(schema)\n\
+                  judge = jsonschema.Draft202012Validator(schema)\n\
+                  for path in sys.argv[2:]:\n    print([e.json_path for e in judge.iter_errors(json.load(open(path)))])\n";
+    let schema = root().join("docs/summary.schema.json");
+    let mut judge = Command::new(python);
+    judge.args(["-c", script]).arg(schema).args(&summaries).arg(cut);
+    let judged = judge.output().expect("python runs");
+    let said = String::from_utf8_lossy(&judged.stdout);
+    assert_eq!(said, "[]\n[]\n['$.fit']\n", "{}", String::from_utf8_lossy(&judged.stderr));
+}
+
+/// The covariance is that of the parameters: its diagonal their variances, and it is one.
+#[test]
+fn the_covariance_is_that_of_the_parameters() {
+    let out = tempfile::tempdir().expect("temporary folder");
+    let summary = run_pipeline(&root().join("pipelines/paper-normal.toml"), out.path(), &[0, 3]);
+    let covariance = &summary["fit"]["covariance"];
+    let names: Vec<&str> =
+        covariance["names"].as_array().expect("names").iter().filter_map(Value::as_str).collect();
+    let rows: Vec<Vec<f64>> = serde_json::from_value(covariance["rows"].clone()).expect("rows of numbers");
+    let free: Vec<&Value> = summary["fit"]["parameters"]
+        .as_array()
+        .expect("parameters")
+        .iter()
+        .filter(|p| p["free"] == true)
+        .collect();
+    assert!(free.len() > 5 && names.len() == free.len() && rows.len() == free.len());
+    for (i, parameter) in free.iter().enumerate() {
+        assert_eq!(parameter["name"], names[i]);
+        let sigma = parameter["sigma"].as_f64().expect("a number");
+        assert!((rows[i][i].sqrt() / sigma - 1.0).abs() < 1e-9, "{}", names[i]);
+        for (j, row) in rows.iter().enumerate() {
+            let correlation = rows[i][j] / (rows[i][i] * row[j]).sqrt();
+            assert!(
+                correlation.abs() <= 1.0 + 1e-9 && (rows[i][j] - row[i]).abs() <= 1e-12 * rows[i][j].abs()
+            );
+        }
+    }
 }

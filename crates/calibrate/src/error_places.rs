@@ -1,6 +1,7 @@
 //! In which dwells errors are largest: the place in a session that a person would look at first.
 
 use armcal_core::{DwellId, Observation, listed};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,7 +19,7 @@ const GROSS: f64 = 5.0;
 const FEW: f64 = 0.1;
 
 /// Dwells in which the error is larger than elsewhere.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ErrorPlace {
     /// Which: `recording 2` (by its index), `shoulder from 10 to 25 deg`, `recording 1 dwell 96, recording 1 dwell 97`.
     pub place: String,

@@ -1,9 +1,10 @@
 //! Before against after on points that no fit saw, and what their interval says.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What an effect does to errors on groups the fit did not see.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldOut {
     /// Mean error without it [mm].
     pub before: f64,

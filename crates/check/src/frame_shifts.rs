@@ -180,7 +180,7 @@ mod tests {
                              "role": "known_frame" });
         let frames: Value =
             [frame("base", &base), frame("board.a", &boards[0]), frame("board.b", &boards[1])].into();
-        let summary = json!({ "schema": armcal_report::SCHEMA, "pipeline": "rig",
+        let summary = json!({ "schema": armcal_result::summary::SCHEMA, "pipeline": "rig",
                               "fit": { "parameters": [height] }, "frames": frames });
         serde_json::from_value(summary).expect("a summary")
     }

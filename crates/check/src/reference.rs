@@ -3,7 +3,8 @@
 use crate::error::CheckError;
 use armcal_core::{Pose, RollPitchYaw};
 use armcal_recording::input;
-use armcal_report::{SCHEMA, summary_json};
+use armcal_report::summary_json;
+use armcal_result::summary::SCHEMA;
 use armcal_result::{PastRun, Run};
 use serde::Deserialize;
 use std::path::Path;

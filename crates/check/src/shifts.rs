@@ -134,7 +134,7 @@ mod tests {
     use serde_json::{Value, json};
 
     fn calibrated(parameters: &[Value]) -> Calibrated {
-        let summary = json!({ "schema": armcal_report::SCHEMA, "pipeline": "rig",
+        let summary = json!({ "schema": armcal_result::summary::SCHEMA, "pipeline": "rig",
                               "fit": { "parameters": parameters }, "frames": [] });
         serde_json::from_value(summary).expect("a summary")
     }

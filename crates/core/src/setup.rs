@@ -1,11 +1,12 @@
 //! Mistakes of wiring, files, frames and units: what is checked before any physics.
 
 use crate::warning::{Severity, Stage, Warning};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// How sure a finding is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Certainty {
     /// Worth a look; the result may stand.
@@ -15,7 +16,7 @@ pub enum Certainty {
 }
 
 /// Something about the setup that contradicts the data.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SetupFinding {
     /// Stable machine-readable name, `kebab-case`: `joint-sign`.
     pub code: Cow<'static, str>,
@@ -45,7 +46,7 @@ impl SetupFinding {
 }
 
 /// A mistake that would leave no trace in these data: nobody can say whether it was made.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unseen {
     /// The code that the mistake would have.
     pub code: Cow<'static, str>,
@@ -69,7 +70,7 @@ impl Unseen {
 }
 
 /// What the checks of the setup found.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SetupReport {
     /// Changes of the setup that were tried by a refit; 0 where the errors gave no reason to.
     pub tried: usize,

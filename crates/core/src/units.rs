@@ -1,12 +1,13 @@
 //! Physical units: one enum decides symbols and display scaling everywhere a number leaves armcal.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Degrees in a radian.
 pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// The SI unit of a number inside armcal, and how it is shown to people.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub enum Unit {
     /// Length; shown in millimetres.
     #[serde(rename = "m")]

@@ -2,6 +2,7 @@
 //!
 //! Smallest and largest reading hide what lies unvisited between them, and one stray pose makes them wide.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Width of a bin of a turning joint [rad]: 5 deg.
@@ -10,7 +11,7 @@ const TURNING_BIN: f64 = 5.0 * std::f64::consts::PI / 180.0;
 const SLIDING_BIN: f64 = 0.05;
 
 /// The visited part of one joint's range.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Visited {
     /// Width of a bin [rad] (sliding: [m]); the bins begin at zero.
     pub bin: f64,

@@ -1,4 +1,4 @@
-//! What is not shipped: how often the diagnosis is right, and what armcal says to mistakes of the setup.
+//! What is not shipped: how often the diagnosis is right, what armcal says to mistakes of the setup, and what is generated.
 
 mod error;
 mod mistakes;
@@ -17,12 +17,18 @@ enum Cli {
     ///
     /// Exit codes: 0 nothing false was said, 1 the suite itself failed, 3 something false was said, or a sound session accused.
     Mistakes(mistakes::Request),
+    /// The JSON schema of `summary.json`, for docs/summary.schema.json.
+    Schema,
 }
 
 fn main() -> ExitCode {
     let ended = match Cli::parse() {
         Cli::Score(asked) => score::run(&asked).map(|()| ExitCode::SUCCESS),
         Cli::Mistakes(asked) => mistakes::run(&asked).map_err(error::Error::from),
+        Cli::Schema => {
+            let text = format!("{:#}\n", armcal_result::summary::summary_schema());
+            armcal::stdout::print(&text).map(|()| ExitCode::SUCCESS).map_err(error::Error::from)
+        }
     };
     ended.unwrap_or_else(|error| {
         say(&format!("error: {error}"));

@@ -5,13 +5,14 @@ use crate::problem::Amplitude;
 use armcal_calibrate::tails::Z_975;
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Terms below this share of the largest one are left out, where the rest is as clear.
 const SMALL_TERM: f64 = 0.1;
 
 /// A weighted sum of amplitudes, determined where the amplitudes by themselves are not.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Combination {
     /// Its terms; the largest, at typical sizes, has the weight 1.
     pub terms: Vec<Term>,
@@ -24,7 +25,7 @@ pub struct Combination {
 }
 
 /// One term of a combination.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Term {
     /// The amplitude.
     pub name: String,

@@ -5,13 +5,14 @@ use crate::events::moment;
 use crate::problem::{Candidate, DwellRow, Problem};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Fewest pairs that mean anything.
 const MIN_PAIRS: usize = 5;
 
 /// What pairs of visits to the same pose say about an effect, free of geometry.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Contrast {
     /// What differs within a pair.
     pub differs: String,

@@ -8,13 +8,14 @@ use crate::scatter::Scatter;
 use armcal_calibrate::{Calibration, ErrorPlace, HeldOut};
 use armcal_core::{DwellId, Unit, Warning};
 use armcal_model::{EffectSpec, Model};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Stands in a set where an explanation outside the catalogue cannot be excluded.
 pub const NOT_LISTED: &str = "something not listed";
 
 /// The answer in one word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing is missing that these data can show.
@@ -140,7 +141,7 @@ pub struct Gate {
 }
 
 /// Which errors a number is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JudgedOn {
     /// Points held out of the fit, predicted by a fit that never saw them.
@@ -163,7 +164,7 @@ impl JudgedOn {
 }
 
 /// Errors that nothing explains.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
     /// Mean error with everything found in the model [mm].
     pub error_mm: f64,
@@ -184,7 +185,7 @@ pub struct Unexplained {
 }
 
 /// What a diagnosis tried.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Tried {
     /// Effects of the catalogue, each at every target.
     pub listed: usize,
@@ -206,7 +207,7 @@ pub struct Refitted {
 }
 
 /// An error before and after [mm].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BeforeAfter {
     /// Without.
     pub before: f64,
@@ -215,7 +216,7 @@ pub struct BeforeAfter {
 }
 
 /// One effect that belongs in the model.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct FoundEffect {
     /// Its most probable name.
     pub name: String,
@@ -247,7 +248,7 @@ pub struct FoundEffect {
 }
 
 /// What a found effect is preferred to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rival {
     /// Its name.
     pub name: String,
@@ -260,7 +261,7 @@ pub struct Rival {
 }
 
 /// One amplitude with its interval, SI.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ParameterReport {
     /// Name.
     pub name: String,
@@ -316,7 +317,7 @@ pub struct Standing {
 }
 
 /// An effect the data could not have shown.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NotTestable {
     /// Its name.
     pub effect: String,
@@ -369,7 +370,7 @@ pub struct Series {
 }
 
 /// A point of a shape, SI.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShapePoint {
     /// Driver.
     pub at: f64,

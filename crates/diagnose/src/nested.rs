@@ -13,6 +13,7 @@ use armcal_calibrate::{
 };
 use armcal_core::{DwellId, Observation};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -22,7 +23,7 @@ const INNER_FOLDS: usize = 4;
 pub(crate) const RESAMPLINGS: usize = 199;
 
 /// Errors on held-out points with effects that were chosen without them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Nested {
     /// Without any effect, and with those chosen without these points.
     pub held_out: HeldOut,

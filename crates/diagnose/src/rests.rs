@@ -123,19 +123,15 @@ fn part_of_gap(
     let values = now.calibration.fit.values();
     let (_, _, width) =
         now.model.gaps(&values).into_iter().find(|(of, at, _)| of.kind == kind && *at == joint)?;
-    let variance = (assumed * width).powi(2) / 12.0 + own_variance(calibrated, now, &values, joint)?;
+    let variance = (assumed * width).powi(2) / 12.0 + own_variance(calibrated, now, &values, joint);
     let part = (12.0 * variance.max(0.0)).sqrt() / width.abs();
     (NEGLIGIBLE..=WHOLE).contains(&part).then(|| (100.0 * part).round() / 100.0)
 }
 
 /// Variance of a joint's own angle from dwell to dwell beyond what the noise of each explains [rad^2] (prismatic: [m^2]),
-/// negative where that is less: the weighted mean of the squared implied errors less their variances.
-fn own_variance(
-    calibrated: &Calibrated<'_>,
-    refitted: &Refitted,
-    values: &[f64],
-    joint: usize,
-) -> Option<f64> {
+/// negative where that is less, not a number where no dwell tells: the weighted mean of the squared implied errors less their
+/// variances.
+fn own_variance(calibrated: &Calibrated<'_>, refitted: &Refitted, values: &[f64], joint: usize) -> f64 {
     let calibration = &refitted.calibration;
     let errors: Vec<ImpliedError> = calibration
         .judged_pairs(calibrated.observations)
@@ -148,5 +144,5 @@ fn own_variance(
         sum += weight * (e.error.powi(2) - e.sigma.powi(2));
         weights += weight;
     }
-    (weights > 0.0).then(|| sum / weights)
+    sum / weights
 }

@@ -1,6 +1,7 @@
 //! What repeats in a joint's error curve: the teeth, lines and pole pairs of what turns with it.
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -25,7 +26,7 @@ const STEP: f64 = 0.05;
 const MULTIPLES: usize = 3;
 
 /// A periodic part of an error curve over a joint's own angle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Ripple {
     /// Periods in one turn of the joint.
     pub periods_per_turn: f64,

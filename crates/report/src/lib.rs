@@ -16,7 +16,6 @@
 mod campaign;
 mod channels;
 mod comparison;
-mod diagnosis_summary;
 mod diagnosis_text;
 mod error;
 mod findings;
@@ -45,7 +44,7 @@ pub use page::{PageKind, comparison_html, refit_json, report_html};
 pub use past_diagnosis::past_diagnosis;
 pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
 pub use pool_json::{POOL_SCHEMA, pool_json};
-pub use summary::{SCHEMA, summary_json};
+pub use summary::summary_json;
 pub use terminal::{Detail, terminal};
 pub use verification::{
     IsoReport, PathSample, Told, Verification, VerifiedRecording, verification_files, verification_json,

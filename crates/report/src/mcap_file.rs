@@ -120,7 +120,7 @@ fn about_run(run: &Run) -> BTreeMap<String, String> {
         ("pipeline".to_owned(), run.pipeline_name.clone()),
         ("model".to_owned(), run.model.chain().name().to_owned()),
         ("objective".to_owned(), run.calibration.fit.objective.clone()),
-        ("summary_schema".to_owned(), crate::SCHEMA.to_owned()),
+        ("summary_schema".to_owned(), armcal_result::summary::SCHEMA.to_owned()),
     ]);
     if let Ok(pipeline) = run.pipeline_text.parse::<toml::Table>() {
         seeds("", &pipeline, &mut entries);

@@ -2,8 +2,8 @@
 //!
 //! The names are a contract (`armcal.pool/1`): fields are added, never renamed. Every number is finite or `null`.
 
-use crate::summary::{error_summary, fit, parameter, side};
 use armcal_calibrate::Calibration;
+use armcal_result::summary::{CovarianceSummary, ErrorsSummary, FitSummary, ParameterSummary, SideSummary};
 use armcal_result::{RecordingErrors, RecordingRun, Run, VERSION};
 use armcal_wording::{answer, conclusion};
 use serde_json::{Value, json};
@@ -16,15 +16,15 @@ pub(crate) const FILE: &str = "pool.json";
 /// Of a run of earlier results: indented JSON with a final newline.
 pub fn pool_json(run: &Run) -> String {
     let own: Vec<Vec<usize>> = (0..run.recordings.len()).map(|at| run.model.own_parameters(at)).collect();
-    let is_shared = |index: &usize| !own.iter().any(|own| own.contains(index));
     let estimates = &run.calibration.fit.estimates;
-    let shared: Vec<usize> = (0..estimates.len()).filter(is_shared).collect();
-    let mut of_fit = fit(&run.calibration);
-    of_fit["parameters"] = shared.iter().map(|&index| parameter(&estimates[index])).collect();
+    let parameters = |index: &[usize]| -> Vec<ParameterSummary<'_>> {
+        index.iter().map(|&index| (&estimates[index]).into()).collect()
+    };
+    let shared = run.shared_parameters();
+    let of_fit = FitSummary { parameters: parameters(&shared), ..FitSummary::of(run) };
     let answer = answer(run);
     let recordings = run.recordings.iter().zip(run.errors_by_recording()).zip(&own);
-    let transfer =
-        |c: &Calibration| json!({ "noise_floor_mm": c.noise_floor_m * 1e3, "unseen": side(&c.holdout) });
+    let transfer = |c: &Calibration| json!({ "noise_floor_mm": c.noise_floor_m * 1e3, "unseen": SideSummary::from(&c.holdout) });
     let summary = json!({
         "schema": POOL_SCHEMA,
         "version": VERSION,
@@ -35,8 +35,6 @@ pub fn pool_json(run: &Run) -> String {
             .collect::<Value>(),
         // With the hold-out of the pipeline; its parameters are the shared ones.
         "fit": of_fit,
-        // Covariance of the shared parameters that are free, SI.
-        "covariance": covariance(run, &shared),
         // Whole recordings held out in turn; `null` with one recording.
         "transfer": run.transfer.as_ref().map(transfer),
         "conclusion": conclusion(&run.calibration),
@@ -57,23 +55,12 @@ fn summary_of(run: &Run, recording: &RecordingRun, errors: &RecordingErrors, own
         "files": recording.files(),
         "dwells": recording.found(),
         "rejected": recording.rejected(),
-        "nominal_mm": error_summary(&errors.nominal),
-        "fitted_mm": error_summary(&errors.calibrated),
+        "nominal_mm": ErrorsSummary::from(&errors.nominal),
+        "fitted_mm": ErrorsSummary::from(&errors.calibrated),
         // By calibrations that never saw this recording.
-        "unseen_mm": errors.unseen.as_ref().map(error_summary),
+        "unseen_mm": errors.unseen.as_ref().map(ErrorsSummary::from),
         // What this recording has for itself.
-        "parameters": own.iter().map(|&index| parameter(&estimates[index])).collect::<Value>(),
-        "covariance": covariance(run, own),
-    })
-}
-
-/// Of those that are free.
-fn covariance(run: &Run, index: &[usize]) -> Value {
-    let fit = &run.calibration.fit;
-    let free: Vec<usize> = index.iter().copied().filter(|&i| fit.estimates[i].parameter.free).collect();
-    let block = fit.covariance.block(&free);
-    json!({
-        "names": free.iter().map(|&i| &fit.estimates[i].parameter.name).collect::<Vec<_>>(),
-        "rows": block.row_iter().map(|row| row.iter().copied().collect()).collect::<Vec<Vec<f64>>>(),
+        "parameters": own.iter().map(|&index| ParameterSummary::from(&estimates[index])).collect::<Vec<_>>(),
+        "covariance": CovarianceSummary::of(&run.calibration.fit, own),
     })
 }

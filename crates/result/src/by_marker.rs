@@ -3,11 +3,12 @@
 use crate::run::Run;
 use armcal_core::Observation;
 use armcal_core::units::millimetres;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Errors of the tip, of one marker or of joined points, on the side by which the calibration is judged.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct MarkerErrors<'a> {
     /// Its name; of what was measured against a fixed place that too (`tip from post`).
     pub marker: String,

@@ -25,6 +25,7 @@ mod recorded_time;
 mod recording_names;
 mod run;
 mod same_dwells;
+pub mod summary;
 mod two_arms;
 mod warnings;
 

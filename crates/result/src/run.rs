@@ -220,6 +220,13 @@ impl Run {
         }
     }
 
+    /// Indices of the parameters that no recording has for itself.
+    pub fn shared_parameters(&self) -> Vec<usize> {
+        let own: BTreeSet<usize> =
+            (0..self.recordings.len()).flat_map(|at| self.model.own_parameters(at)).collect();
+        (0..self.model.parameters().len()).filter(|index| !own.contains(index)).collect()
+    }
+
     /// Whether it is of earlier results, without reading a recording.
     pub fn is_pool(&self) -> bool {
         self.recordings.iter().any(|r| r.earlier.is_some())

@@ -2,10 +2,11 @@
 
 use crate::Run;
 use armcal_core::{Against, Observation};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Two arms, or two points of one robot, and how they are joined.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct TwoArms<'a> {
     /// Their names.
     pub arms: [&'a str; 2],

@@ -1,17 +1,8 @@
 //! Each number of the verdict in one plain sentence.
 
 use armcal_diagnose::{Diagnosis, FoundEffect, Nested, Unexplained, Verdict};
-use serde::Serialize;
+use armcal_result::summary::Explanation;
 use std::collections::BTreeMap;
-
-/// A number of the verdict, in a plain sentence.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Explanation {
-    /// Which number: `probability`, `p_adjusted`.
-    pub number: String,
-    /// What it says.
-    pub sentence: String,
-}
 
 /// Sentences for the verdict and its numbers.
 pub fn explanations(d: &Diagnosis) -> Vec<Explanation> {

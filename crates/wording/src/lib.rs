@@ -16,7 +16,7 @@ mod two_arms;
 
 pub use answer::{Answer, answer};
 pub use drivers::{channel_told, driver_told};
-pub use explanations::{Explanation, explanations, nested_sentence};
+pub use explanations::{explanations, nested_sentence};
 pub use found::{WITH_CURVES, all_found, briefly_found, found, kind_of, pasted, shown_unlisted, unlisted};
 pub use headline::headline;
 pub use look_at::look_at;

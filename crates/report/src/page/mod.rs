@@ -25,10 +25,11 @@ use armcal_core::units::millimetres;
 use armcal_diagnose::{FoundEffect, NotTestable};
 use armcal_result::by_marker::{MarkerErrors, by_marker};
 use armcal_result::levers::Basis;
+use armcal_result::summary::Explanation;
 use armcal_result::{Refit, Run};
 use armcal_wording::{
-    Explanation, Story, ToldWarning, WITH_CURVES, about, explanations, kind_of, nested_sentence, pasted,
-    shown_unlisted, sizes_of, unlisted,
+    Story, ToldWarning, WITH_CURVES, about, explanations, kind_of, nested_sentence, pasted, shown_unlisted,
+    sizes_of, unlisted,
 };
 use askama::Template;
 use document::Document;

@@ -1,6 +1,7 @@
 use crate::synthetic::{HOSTILE, synthetic};
 use armcal_core::ErrorStats;
-use armcal_report::{SCHEMA, summary_json};
+use armcal_report::summary_json;
+use armcal_result::summary::SCHEMA;
 use serde::Deserialize;
 
 /// The contract, field by field: all of these must be there.
