@@ -1,10 +1,9 @@
 //! What all refits of a run share: its dwells, what may drive an error, and the levers.
 
-use super::lever::Levers;
+use super::lever::{Levers, joint_units};
 use crate::analysis::feels_gravity;
 use crate::column::Column;
 use crate::run::Run;
-use armcal_core::Unit;
 use armcal_model::Masses;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -139,9 +138,4 @@ fn spread(driver: &Driver) -> f64 {
     let known = driver.values.0.iter().flatten();
     let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     if high >= low { high - low } else { 0.0 }
-}
-
-/// Unit of every joint's reading.
-pub(crate) fn joint_units(run: &Run) -> Vec<Unit> {
-    (0..run.model.joint_count()).map(|j| run.model.chain().joint_unit(j)).collect()
 }

@@ -3,12 +3,11 @@
 //! An implied error is linear in the residual, so each dwell has one lever for each channel. They are worked out once, at
 //! the run's own fit, and serve every refit: geometry that differs by some millimetres does not move them.
 
-use super::basis::joint_units;
 use crate::analysis::moves_tip;
 use crate::run::Run;
 use armcal_calibrate::{BLURRED, PositionNoise, implied_joint_errors};
-use armcal_core::Observation;
 use armcal_core::robust::median;
+use armcal_core::{Observation, Unit};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -148,4 +147,9 @@ fn drop_uncertain(levers: &mut [Option<Lever>]) {
             *lever = None;
         }
     }
+}
+
+/// Unit of every joint's reading.
+pub(crate) fn joint_units(run: &Run) -> Vec<Unit> {
+    (0..run.model.joint_count()).map(|j| run.model.chain().joint_unit(j)).collect()
 }
