@@ -236,3 +236,51 @@ fn two_hundred_trees_move_and_weigh_as_pinocchio_says() {
     );
     assert_eq!(FeatureId::TIP, cases[0].0.features().next().expect("a tip").0);
 }
+
+/// Links of a description that is large in one way.
+const MANY: usize = 30_000;
+
+/// Time is in proportion to a description, however its links hang together: what grew with the square of their number would
+/// take minutes, and twenty seconds are allowed.
+#[test]
+fn a_large_description_is_read_in_proportion() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let mesh = "<visual><geometry><mesh filename=\"a.stl\"/></geometry></visual><collision><geometry><box size=\"1 1 1\"/>\
+                </geometry></collision>";
+    let kinds: [(&str, fn(usize) -> usize, &str, &str); 4] = [
+        ("a chain", |k| k - 1, "", "fixed"),
+        ("a star", |k| (k - 1).min(5), "", "fixed"),
+        ("meshes", |k| k - 1, mesh, "fixed"),
+        ("joints that follow each other", |k| k - 1, "", "revolute"),
+    ];
+    for (what, parent, inside, kind) in kinds {
+        let mut text = "<robot name=\"r\"><link name=\"l0\"/>".to_owned();
+        for k in 1..=MANY {
+            let (kind, mimic) = match k {
+                ..=6 => ("revolute", String::new()),
+                _ if kind == "fixed" => (kind, String::new()),
+                _ => (kind, format!("<mimic joint=\"j{}\"/>", k - 1)),
+            };
+            write!(
+                text,
+                "<link name=\"l{k}\">{inside}</link><joint name=\"j{k}\" type=\"{kind}\"><parent link=\"l{}\"/>\
+                 <child link=\"l{k}\"/><axis xyz=\"0 0 1\"/>{mimic}</joint>",
+                parent(k)
+            )
+            .expect("a string");
+        }
+        text += "</robot>";
+        let urdf = folder.path().join("large.urdf");
+        std::fs::write(&urdf, text).expect("written");
+        let out = folder.path().join("proposed.toml");
+        let output = Command::new("sh")
+            .args(["-c", "ulimit -t 20; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_armcal"), "init"])
+            .arg(root().join("fixtures/paper/normal.mcap"))
+            .args(["--urdf".as_ref(), urdf.as_os_str(), "--out".as_ref(), out.as_os_str()])
+            .output()
+            .expect("starting sh");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{what}: {said}");
+        assert!(said.contains("no topic has the joints"), "{what}: {said}");
+    }
+}

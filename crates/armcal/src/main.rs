@@ -38,23 +38,3 @@ fn ended(result: Result<Outcome, Error>) -> ExitCode {
         }
     }
 }
-
-/// Asks whether stdout is open before the standard library hides that: it begins only after the constructors of the
-/// program.
-#[cfg(target_os = "linux")]
-mod begin {
-    use std::sync::atomic::Ordering;
-
-    extern "C" fn look() {
-        // SAFETY: it asks about a number and changes nothing.
-        #[allow(unsafe_code, reason = "no safe interface takes a descriptor that may be closed")]
-        let closed = unsafe { libc::fcntl(libc::STDOUT_FILENO, libc::F_GETFD) } == -1;
-        armcal::stdout::WAS_CLOSED.store(closed, Ordering::Relaxed);
-    }
-
-    // SAFETY: the loader calls every function in this section once, before `main`; it needs nothing that is made later.
-    #[allow(unsafe_code, reason = "nothing else runs before the standard library")]
-    #[used]
-    #[unsafe(link_section = ".init_array")]
-    static LOOK: extern "C" fn() = look;
-}

@@ -5,19 +5,14 @@ use armcal_core::Warning;
 use armcal_report::TerminalStyle;
 use std::borrow::Cow;
 use std::io::{self, ErrorKind, IsTerminal as _, Write as _};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Losses told one by one where there is no other place for them.
 const TOLD: usize = 20;
 
-/// Whether stdout was closed when the process began. Only `main` can see that: before it runs, the standard library opens
-/// `/dev/null` in the place of a closed descriptor, where everything can be written and nothing arrives.
-pub static WAS_CLOSED: AtomicBool = AtomicBool::new(false);
-
 /// Prints a result, at once. A reader that has seen enough and closed the pipe is no error.
 ///
 /// # Errors
-/// [`Error::Stdout`] where it cannot be written: a full disk, a closed descriptor.
+/// [`Error::Stdout`] where it cannot be written: a full disk.
 pub fn print(text: &str) -> Result<(), Error> {
     written(|out| out.write_all(harmless(text, style()).as_bytes()))
 }
@@ -66,9 +61,6 @@ impl io::Write for Lines<'_> {
 /// # Errors
 /// As [`print`].
 pub fn written(write: impl FnOnce(&mut dyn io::Write) -> io::Result<()>) -> Result<(), Error> {
-    if WAS_CLOSED.load(Ordering::Relaxed) {
-        return Err(Error::Stdout(io::Error::other("it is closed")));
-    }
     #[allow(clippy::disallowed_methods, reason = "this is where results are printed")]
     let mut out = io::stdout().lock();
     match write(&mut out).and_then(|()| out.flush()) {
