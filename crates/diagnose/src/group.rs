@@ -3,19 +3,9 @@
 use crate::columns::Functions;
 use crate::evidence::promise;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
+use armcal_model::{Offered, catalogue};
 use nalgebra::{DVector, DVectorView};
 
-/// Families whose cause, a make of gear, bearing or encoder, is likely to be in every joint.
-const OF_A_MAKE: [&str; 8] = [
-    "backlash",
-    "friction_windup",
-    "eccentricity",
-    "second_harmonic",
-    "gear_ratio",
-    "zero_drift",
-    "bearing_compliance",
-    "effort_compliance",
-];
 /// The family whose frequency gears of one make share.
 const PERIODIC: &str = "periodic";
 /// Frequencies of all joints together that are weighed in full.
@@ -25,8 +15,8 @@ const ONE_FREQUENCY: f64 = 0.5;
 
 /// The candidates, and for gears of one make all joints together: each joint alone may be hidden by the others.
 pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
-    for family in OF_A_MAKE {
-        let members: Vec<&Candidate> = all.iter().filter(|c| c.family == family).collect();
+    for kind in catalogue().iter().filter(|kind| kind.of_a_make && kind.offered != Offered::Scanned) {
+        let members: Vec<&Candidate> = all.iter().filter(|c| c.family == kind.name).collect();
         if members.len() < 2 {
             continue;
         }

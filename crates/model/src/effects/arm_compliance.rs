@@ -47,6 +47,7 @@ pub(super) const KIND: EffectKind = EffectKind {
         "belt_coupling",
     ],
     place,
+    lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
 

@@ -44,6 +44,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[LED, REST],
     confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
     place,
+    of_a_make: true,
+    lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
 

@@ -48,6 +48,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
     place,
+    told_by: "put a marker on the robot's base: it moves only if the base gives way",
     ..EffectKind::PLAIN
 };
 

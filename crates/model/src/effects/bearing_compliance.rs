@@ -33,6 +33,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     never_negative: &["tilt", "tilt_load"],
     confused_with: &["compliance", "base_compliance", "arm_compliance", "link_bending"],
     place,
+    of_a_make: true,
     ..EffectKind::PLAIN
 };
 

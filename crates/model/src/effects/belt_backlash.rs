@@ -35,6 +35,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[LED],
     confused_with: &["backlash", "crossed_backlash", "friction_windup"],
     place,
+    lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
 

@@ -33,6 +33,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "link_bending", "base_compliance", "hardening_compliance"],
     place,
+    lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
 

@@ -27,6 +27,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     confused_with: &["sensor_scale"],
     place,
+    lookalikes: &[Lookalikes::Lengths],
     ..EffectKind::PLAIN
 };
 

@@ -36,6 +36,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     confused_with: &["frame_shift", "tool_shift"],
     place,
+    look_at: "The board slipped on its stand or under its markers: look at its clamps, and measure it again before and after.",
     ..EffectKind::PLAIN
 };
 

@@ -47,6 +47,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     ],
     confused_with: &["backlash", "belt_backlash"],
     place,
+    lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
 

@@ -27,6 +27,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     family: Family::Transmission,
     confused_with: &["second_harmonic", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
     place,
+    of_a_make: true,
+    lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
 };
 

@@ -28,6 +28,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     confused_with: &["compliance", "hardening_compliance"],
     place,
+    of_a_make: true,
+    lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
 

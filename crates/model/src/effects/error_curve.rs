@@ -56,6 +56,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     ],
     confused_with: &["eccentricity", "second_harmonic", "periodic", "gear_ratio"],
     place,
+    lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
 };
 

@@ -28,6 +28,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     confused_with: &["zero_drift", "thermal_growth", "warm_up", "frame_shift"],
     place,
+    lookalikes: &[Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
 

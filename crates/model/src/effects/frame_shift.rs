@@ -34,6 +34,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     confused_with: &["zero_slip", "tool_shift", "board_shift", "frame_drift"],
     place,
+    look_at: "The robot's foot, the table or the cameras moved, or a tilt is not what was declared: look at their clamps and marker plates.",
+    lookalikes: &[Lookalikes::Moments],
     ..EffectKind::PLAIN
 };
 

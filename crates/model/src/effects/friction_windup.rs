@@ -35,6 +35,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[LED],
     confused_with: &["backlash"],
     place,
+    of_a_make: true,
+    lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
 

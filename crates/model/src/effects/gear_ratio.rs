@@ -35,6 +35,8 @@ pub(super) const KIND: EffectKind = EffectKind {
         "base_compliance",
     ],
     place,
+    of_a_make: true,
+    lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
 };
 

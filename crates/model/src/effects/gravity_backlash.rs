@@ -71,6 +71,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     never_negative: &["width"],
     confused_with: &["backlash", "compliance", "arm_compliance"],
     place,
+    lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
 

@@ -32,6 +32,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[SEATED],
     confused_with: &["compliance", "gravity_backlash"],
     place,
+    lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
 

@@ -28,6 +28,14 @@ pub struct EffectKind {
     pub never_negative: &'static [&'static str],
     /// Other entries that look alike in common data, though not in all.
     pub confused_with: &'static [&'static str],
+    /// Whether its cause, a make of gear, bearing or encoder, is likely to be in every joint.
+    pub of_a_make: bool,
+    /// What to look at on the rig where it is named; empty where that is what its family asks for.
+    pub look_at: &'static str,
+    /// The measurement that tells it from anything else; empty where there is none of its own.
+    pub told_by: &'static str,
+    /// Effects that it is the same as to every motion.
+    pub lookalikes: &'static [Lookalikes],
     /// Its source file, whose header is its documentation.
     pub(crate) source: &'static str,
     /// Puts it in its place, or says why it has none there.
@@ -47,6 +55,10 @@ impl EffectKind {
         shapes: &[],
         never_negative: &[],
         confused_with: &[],
+        of_a_make: false,
+        look_at: "",
+        told_by: "",
+        lookalikes: &[],
         source: "",
         place: |_| Err("it has no physics".to_owned()),
     };
@@ -66,6 +78,23 @@ impl std::fmt::Debug for EffectKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "EffectKind({})", self.name)
     }
+}
+
+/// Effects that are the same to every motion, so that only another sensor or test tells them apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lookalikes {
+    /// What depends on the direction of arrival.
+    LostMotion,
+    /// Joints and links that give way.
+    Springs,
+    /// Changes at a moment.
+    Moments,
+    /// What makes every length another.
+    Lengths,
+    /// What depends on the angle of a joint.
+    Turns,
+    /// What creeps.
+    Slow,
 }
 
 /// Families of mechanisms.

@@ -35,6 +35,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     never_negative: &["sag", "sag_load"],
     confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
     place,
+    lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
 

@@ -30,6 +30,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     confused_with: &["tool_shift", "zero_slip"],
     place,
+    look_at: "That marker came loose, was knocked or put on again: look at its mount, and at the recording around that time.",
     ..EffectKind::PLAIN
 };
 

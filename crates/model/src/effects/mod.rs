@@ -76,7 +76,7 @@ pub use declared::is_of_effect;
 pub use drivers::{Drivers, Torque};
 pub use expression::Expression;
 pub use in_model::least_dwells;
-pub use kind::{EffectKind, Family, Offered, Shape, Target, Toggle};
+pub use kind::{EffectKind, Family, Lookalikes, Offered, Shape, Target, Toggle};
 pub use placed::PlacedEffect;
 pub use session::Session;
 pub use spec::{EffectSpec, Since, place_and_moment};

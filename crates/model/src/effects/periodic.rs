@@ -38,6 +38,8 @@ pub(super) const KIND: EffectKind = EffectKind {
         values: Some(frequencies),
     }],
     place,
+    of_a_make: true,
+    lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
 };
 

@@ -1,7 +1,7 @@
 //! What the file of every effect is written with.
 
 pub(super) use super::drivers::Drivers;
-pub(super) use super::kind::{EffectKind, Family, Offered, Placement, Shape, Target, Toggle};
+pub(super) use super::kind::{EffectKind, Family, Lookalikes, Offered, Placement, Shape, Target, Toggle};
 pub(super) use super::physics::{Deformation, Physics, Slot};
 pub(super) use super::placing::{
     ARM, Placing, amplitude, amplitudes_wave, amplitudes_xyz, of_event, shift_xyz, turn_xyz,

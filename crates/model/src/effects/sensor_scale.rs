@@ -30,6 +30,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     confused_with: &["volume_distortion"],
     place,
+    lookalikes: &[Lookalikes::Lengths],
     ..EffectKind::PLAIN
 };
 

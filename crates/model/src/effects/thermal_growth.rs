@@ -28,6 +28,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     confused_with: &["zero_drift", "frame_drift", "warm_up"],
     place,
+    lookalikes: &[Lookalikes::Lengths, Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
 

@@ -31,6 +31,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[ARM],
     confused_with: &["zero_slip", "frame_shift"],
     place,
+    look_at: "The tool or its markers were remounted, bent or knocked: look at the last link.",
+    lookalikes: &[Lookalikes::Moments, Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
 

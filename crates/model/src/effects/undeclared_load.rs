@@ -35,6 +35,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[ARM],
     confused_with: &["zero_slip", "frame_shift", "tool_shift"],
     place,
+    look_at: "Weigh what the tool carried in that recording, and declare it as `load_kg`.",
+    told_by: "weigh what the tool carries, and declare it as `load_kg`",
     ..EffectKind::PLAIN
 };
 

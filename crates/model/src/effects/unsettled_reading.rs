@@ -34,6 +34,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[SEATED],
     confused_with: &["backlash", "friction_windup"],
     place,
+    look_at: "Read the joints later, when arm and readings have settled: look at waiting times, filters and whether set-points are recorded.",
+    told_by: "wait longer before the joints are read, or come to the same poses from near and from far",
     ..EffectKind::PLAIN
 };
 

@@ -39,6 +39,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     }],
     confused_with: &["thermal_growth", "zero_drift", "frame_drift"],
     place,
+    lookalikes: &[Lookalikes::Lengths, Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
 

@@ -26,6 +26,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Time,
     confused_with: &["frame_drift", "thermal_growth", "warm_up", "zero_slip"],
     place,
+    of_a_make: true,
+    lookalikes: &[Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
 

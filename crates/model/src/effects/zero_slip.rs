@@ -30,6 +30,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     confused_with: &["frame_shift", "tool_shift", "zero_drift"],
     place,
+    look_at: "An encoder or a belt slipped: look at that joint's encoder coupling, set-screws and belt teeth, and home it again.",
+    lookalikes: &[Lookalikes::Moments],
     ..EffectKind::PLAIN
 };
 
