@@ -23,7 +23,8 @@ pub use error::ArchiveError;
 pub use shard::{Receipt, Shard};
 
 use armcal_config::{Manifest, Pipeline};
-use armcal_report::{Campaign, FailedRecording, write_campaign};
+use armcal_report::write_campaign;
+use armcal_result::{Campaign, FailedRecording};
 use key::Keys;
 use shard::Done;
 use std::collections::BTreeSet;

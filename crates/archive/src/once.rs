@@ -3,7 +3,7 @@
 use super::store::Store;
 use crate::error::ArchiveError;
 use armcal_campaign::Row;
-use armcal_report::Repeat;
+use armcal_result::Repeat;
 use armcal_result::{DwellMark, also_in};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;

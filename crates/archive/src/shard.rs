@@ -3,7 +3,7 @@
 use super::store;
 use crate::error::ArchiveError;
 use armcal_recording::{input, make_folder_in};
-use armcal_report::FailedRecording;
+use armcal_result::FailedRecording;
 use armcal_result::VERSION;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

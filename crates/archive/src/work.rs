@@ -4,7 +4,8 @@ use super::key::Keys;
 use super::store::Store;
 use crate::error::ArchiveError;
 use armcal_config::{Pipeline, RecordingEntry};
-use armcal_report::{FailedRecording, campaign_row, write_all, write_brief};
+use armcal_report::{campaign_row, write_all, write_brief};
+use armcal_result::FailedRecording;
 use armcal_stages::Silent;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

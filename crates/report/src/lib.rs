@@ -33,10 +33,7 @@ mod verification;
 mod viewer_text;
 mod write;
 
-pub use campaign::{
-    Campaign, FailedRecording, Repeat, campaign_files, campaign_json, campaign_row, campaign_text,
-    write_campaign,
-};
+pub use campaign::{campaign_files, campaign_json, campaign_row, campaign_text, write_campaign};
 pub use comparison::{comparison_sentence, comparison_text};
 pub use diagnosis_text::{concluded_text, diagnosis_text};
 pub use error::ReportError;
@@ -46,8 +43,5 @@ pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
 pub use pool_json::{POOL_SCHEMA, pool_json};
 pub use summary::summary_json;
 pub use terminal::{Detail, terminal};
-pub use verification::{
-    IsoReport, PathSample, Told, Verification, VerifiedRecording, verification_files, verification_json,
-    verification_paths, verification_text,
-};
+pub use verification::{verification_files, verification_json, verification_paths, verification_text};
 pub use write::{pool_files, run_files, write_all, write_brief};

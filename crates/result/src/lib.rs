@@ -9,6 +9,7 @@ mod adequate;
 pub mod analysis;
 pub mod by_marker;
 mod called;
+mod campaign;
 mod column;
 mod comparison;
 mod conclusions;
@@ -27,12 +28,14 @@ mod run;
 mod same_dwells;
 pub mod summary;
 mod two_arms;
+mod verification;
 mod warnings;
 
 pub use armcal_campaign::Status;
 pub use armcal_core::DwellMark;
 pub use armcal_model_file::{PastArms, PastModel};
 pub use called::Called;
+pub use campaign::{Campaign, FailedRecording, Repeat};
 pub use column::Column;
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use conclusions::{Conclusions, FILE as CONCLUSIONS_FILE, Grounds};
@@ -51,4 +54,5 @@ pub use run::{
 };
 pub use same_dwells::also_in;
 pub use two_arms::{Closing, TwoArms, link_length_m};
+pub use verification::{IsoReport, PathSample, Told, Verification, VerifiedRecording};
 pub use warnings::status_of;

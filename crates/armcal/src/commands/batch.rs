@@ -6,7 +6,8 @@ use crate::progress::Progress;
 use armcal_archive::{Counter as _, Request, Shard, batch, receipt_file};
 use armcal_config::{Manifest, Pipeline};
 use armcal_recording::input;
-use armcal_report::{Campaign, campaign_files, campaign_json, campaign_text};
+use armcal_report::{campaign_files, campaign_json, campaign_text};
+use armcal_result::Campaign;
 use armcal_result::Status;
 use std::path::{Path, PathBuf};
 

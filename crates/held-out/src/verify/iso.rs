@@ -8,7 +8,7 @@ use super::motion::{Motion, set_point};
 use crate::error::HeldOutError;
 use armcal_core::{Dwell, DwellId, Observation, Reference, Samples};
 use armcal_iso9283::{Evidence, PathTest, Settings, TimedPose, TipPose, Visit, assess};
-use armcal_report::IsoReport;
+use armcal_result::IsoReport;
 use armcal_stages::{Placed, PlacedBase};
 use armcal_stages::{Seen, observe};
 use armcal_verify::{PathError, Planned, Polyline};

@@ -3,7 +3,7 @@
 use armcal_core::{DwellId, Observation, Samples, Severity, Stage, Unit, Visited, Warning};
 use armcal_model::{Chain, Model, PlacedEffect};
 use armcal_recording::{FileReport, sha256_of};
-use armcal_report::Told;
+use armcal_result::Told;
 use armcal_result::{DwellMark, PastModel, also_in};
 use armcal_stages::Seen;
 use std::collections::BTreeMap;

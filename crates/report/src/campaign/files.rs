@@ -3,13 +3,12 @@
 use super::page::CampaignPage;
 use super::story::conclusion;
 use super::words::{meaning, repeated, sentence};
-use super::{Campaign, FailedRecording, Repeat};
 use crate::ReportError;
 use crate::tables::Columns;
 use crate::write::{commit_all, stage, stage_pieces};
 use armcal_campaign::{Change, Row};
 use armcal_core::Unit;
-use armcal_result::{Status, VERSION};
+use armcal_result::{Campaign, FailedRecording, Repeat, Status, VERSION};
 use askama::Template as _;
 use serde::Serialize;
 use std::io::Write as _;

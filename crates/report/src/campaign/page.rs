@@ -1,12 +1,12 @@
 //! The page of a campaign: errors over time, every change with its series, every recording.
 
-use super::Campaign;
 use super::story::campaign_story;
 use super::words::{self, meaning, repeated, sentence};
 use crate::ReportError;
 use crate::page::embed;
 use crate::page::shell::Shell;
 use armcal_campaign::{Row, Series};
+use armcal_result::Campaign;
 use armcal_wording::ToldWarning;
 use askama::Template;
 use serde_json::{Value, json};
@@ -22,7 +22,7 @@ pub(super) struct CampaignPage<'a> {
     next: Vec<String>,
     changes: Vec<(String, &'static str)>,
     rows: Vec<(&'a Row, &'a String)>,
-    failed: &'a [super::FailedRecording],
+    failed: &'a [armcal_result::FailedRecording],
     repeats: Vec<String>,
     warnings: Vec<ToldWarning>,
 }

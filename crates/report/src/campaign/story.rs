@@ -1,10 +1,10 @@
 //! What a campaign comes to: how many, how well, what is wrong, what to do next.
 
-use super::Campaign;
 use super::words::{meaning, sentence};
 use armcal_campaign::{ErrorFigures, Row, Status};
 use armcal_core::units::millimetres;
 use armcal_core::{Severity, listed, printable};
+use armcal_result::Campaign;
 use armcal_wording::{Story, ToldWarning};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;

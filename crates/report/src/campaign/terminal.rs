@@ -1,13 +1,12 @@
 //! A campaign for people, at most 100 columns wide.
 
-use super::Campaign;
 use super::story::campaign_story;
 use super::words::{cells, meaning, repeated, sentence};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::terminal::{Detail, Shown, ending};
 use armcal_campaign::Row;
 use armcal_core::printable;
-use armcal_result::VERSION;
+use armcal_result::{Campaign, VERSION};
 use comfy_table::Cell;
 
 /// Recordings listed at most; all are in the page and in the table files.

@@ -1,10 +1,10 @@
 //! A change in words.
 
 use super::date::minute;
-use super::{Campaign, Repeat};
 use armcal_campaign::{Change, ChangeKind, ErrorFigures, Row, Status};
 use armcal_core::units::millimetres;
 use armcal_core::{Unit, printable};
+use armcal_result::{Campaign, Repeat};
 use armcal_wording::in_display_unit;
 
 /// Days of a month, as rates are told.

@@ -1,10 +1,9 @@
 //! A verification for programs.
 
 use super::page::verification_html;
-use super::{PathSample, Verification};
 use crate::ReportError;
 use crate::tables::Columns;
-use armcal_result::VERSION;
+use armcal_result::{PathSample, VERSION, Verification};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -1,9 +1,9 @@
 //! Criteria of ISO 9283 in the terminal: the worst place of each, and what the recordings cannot show.
 
-use super::IsoReport;
 use crate::pen::{Pen, number};
 use armcal_core::printable;
 use armcal_iso9283::{Criterion, NotMeasured};
+use armcal_result::IsoReport;
 use comfy_table::Cell;
 
 /// Columns of [`rows`].

@@ -1,13 +1,12 @@
 //! The page of `armcal verify`: the tables, and the source paper's figures 6, 7 and 10 for the longest motions.
 
-use super::iso;
 use super::row::Row;
 use super::terminal::conclusion;
-use super::{PathSample, Verification};
+use super::{iso, no_criteria, points_are};
 use crate::ReportError;
 use crate::page::embed;
 use crate::page::shell::Shell;
-use armcal_result::RecordingNames;
+use armcal_result::{PathSample, RecordingNames, Verification};
 use armcal_verify::{Against, PathRow, PointsRow};
 use armcal_wording::{ToldWarning, gravest_first, status_sentence};
 use askama::Template;
@@ -38,10 +37,10 @@ pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
             ..shell.saying(conclusion(v))
         },
         tables: vec![
-            (v.points_are(), v.points.iter().map(point_row).collect()),
+            (points_are(v), v.points.iter().map(point_row).collect()),
             ("Error along paths", v.paths.iter().map(path_row).collect()),
         ],
-        iso_none: v.no_criteria(),
+        iso_none: no_criteria(v),
         iso_header: iso::HEADER,
         iso_rows: iso::rows(&v.iso9283),
         iso_remarks: iso::remarks(&v.iso9283),

@@ -1,12 +1,12 @@
 //! A verification for people, at most 100 columns wide.
 
 use super::row::{Row, or_dash};
-use super::{Told, Verification, VerifiedRecording};
+use super::{no_criteria, points_are};
 use crate::pen::{Pen, TerminalStyle, number};
 use armcal_config::{On, Published};
 use armcal_core::printable;
 use armcal_core::units::millimetres;
-use armcal_result::{Closing, VERSION};
+use armcal_result::{Closing, Told, VERSION, Verification, VerifiedRecording};
 use armcal_verify::{Against, By, Compared, PathRow, Plane};
 use comfy_table::Cell;
 
@@ -27,7 +27,7 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
         let rows = v.points.iter().map(Row::of_points);
         let published = v.published.iter().filter(|p| p.on == On::Points);
         sections
-            .push(pen.section(&format!("{} [mm]", v.points_are()), table(&pen, "points", rows, published)));
+            .push(pen.section(&format!("{} [mm]", points_are(v)), table(&pen, "points", rows, published)));
     }
     let of = |against| v.paths.iter().filter(move |r: &&PathRow| r.against == against);
     for (against, title) in [
@@ -39,7 +39,7 @@ pub fn verification_text(v: &Verification, style: TerminalStyle) -> String {
             sections.push(pen.section(title, table(&pen, "path", of(against).map(Row::of_path), published)));
         }
     }
-    sections.push(super::iso::section(&pen, &v.iso9283, v.no_criteria()));
+    sections.push(super::iso::section(&pen, &v.iso9283, no_criteria(v)));
     if !v.warnings.is_empty() {
         let texts = v.warnings.iter().map(|w| (w.severity.word(), printable(&w.to_string())));
         sections.push(pen.section("Warnings", pen.list(texts)));
