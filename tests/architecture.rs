@@ -15,6 +15,8 @@ struct Uses {
     paths: BTreeSet<Module>,
     /// Items that the module passes on under a name of its own.
     passed_on: BTreeMap<String, Module>,
+    /// Names of the types and functions that it defines.
+    defined: BTreeSet<String>,
 }
 
 impl Uses {
@@ -58,16 +60,19 @@ impl Uses {
 
 impl<'ast> Visit<'ast> for Uses {
     fn visit_item(&mut self, item: &'ast syn::Item) {
-        let attributes = match item {
-            syn::Item::Mod(m) => &m.attrs,
-            syn::Item::Use(u) => &u.attrs,
-            syn::Item::Fn(f) => &f.attrs,
+        let (attributes, defined) = match item {
+            syn::Item::Mod(m) => (&m.attrs, None),
+            syn::Item::Use(u) => (&u.attrs, None),
+            syn::Item::Fn(f) => (&f.attrs, Some(&f.sig.ident)),
+            syn::Item::Struct(s) => (&s.attrs, Some(&s.ident)),
+            syn::Item::Enum(e) => (&e.attrs, Some(&e.ident)),
             _ => return syn::visit::visit_item(self, item),
         };
         let is_test = |a: &syn::Attribute| {
             a.path().is_ident("cfg") && a.parse_args::<syn::Ident>().is_ok_and(|what| what == "test")
         };
         if !attributes.iter().any(is_test) {
+            self.defined.extend(defined.map(ToString::to_string));
             syn::visit::visit_item(self, item);
         }
     }
@@ -99,8 +104,9 @@ fn modules(source: &Path) -> Vec<Uses> {
                 let own = matches!(stem.as_str(), "lib" | "main" | "mod");
                 let text = std::fs::read_to_string(&path).expect("a source");
                 let file = syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-                let (paths, passed_on) = Default::default();
-                let mut uses = Uses { module: if own { module.clone() } else { inner }, paths, passed_on };
+                let module = if own { module.clone() } else { inner };
+                let (paths, passed_on, defined) = Default::default();
+                let mut uses = Uses { module, paths, passed_on, defined };
                 uses.visit_file(&file);
                 all.push(uses);
             }
@@ -231,4 +237,44 @@ fn the_crates_lean_on_each_other_as_the_map_has_them() {
         let up: Vec<&String> = packages[at..].iter().filter(|above| needs.contains(above)).collect();
         assert!(up.is_empty(), "{name} leans on {up:?}, which docs/architecture.md has above it");
     }
+}
+
+/// Words of earlier versions for what the field has terms for; the term is the second.
+const TERMS: [(&str, &str); 20] = [
+    ("Bench", "RefitSession"),
+    ("Doubtful", "CompletedWithWarnings"),
+    ("Gate", "SignificanceTest"),
+    ("Knowers", "ParameterScope"),
+    ("Levers", "Sensitivities"),
+    ("Moment", "a state or a sample: a moment is a torque"),
+    ("PastModel", "StoredModel"),
+    ("PastObservations", "StoredObservations"),
+    ("PastRun", "StoredRun"),
+    ("Placing", "EffectContext"),
+    ("Room", "ConditionedProblem"),
+    ("Rooms", "ConditionedProblems"),
+    ("Settled", "Converged"),
+    ("Shares", "TorqueTerms"),
+    ("Turn", "Fold"),
+    ("Word", "JointReference"),
+    ("nobodys", "unobserved"),
+    ("perceive", "preprocess"),
+    ("receipts", "completion markers"),
+    ("tamed", "regularised"),
+];
+
+#[test]
+fn types_functions_and_modules_have_the_terms_of_the_field() {
+    let mut wrong = Vec::new();
+    for manifest in manifests().keys() {
+        for module in modules(&root().join("crates").join(manifest).join("src")) {
+            let own = module.module.last().cloned().unwrap_or_default();
+            for (word, term) in TERMS {
+                if module.defined.contains(word) || own == word {
+                    wrong.push(format!("{manifest}: {} in {}: {term}", word, module.module.join("::")));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }

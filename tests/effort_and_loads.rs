@@ -155,7 +155,7 @@ fn a_joint_without_effort_costs_only_itself() {
     let largest = &read_json(&out.join("model.json"))["session"]["largest_effort_nm"];
     assert!(largest[1].as_f64().is_some_and(|e| e > 4.0) && largest[2].is_null(), "{largest}");
     // What was written is read again: an arm with the effect, on the same poses.
-    armcal_result::PastObservations::open(&out.join("observations.json")).expect("observations");
+    armcal_result::StoredObservations::open(&out.join("observations.json")).expect("observations");
     armcal_result::open_model(&out).expect("a model").arms().expect("its arms");
 
     // What follows the effort of the joint that has none is refused with its name; of another it is fitted.

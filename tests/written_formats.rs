@@ -3,7 +3,7 @@ use crate::support::{
 };
 use armcal_core::{FeatureId, Parameter, Pose, Unit};
 use armcal_model::{Chain, Frames, Model};
-use armcal_result::{PastArms, PastObservations, open_model};
+use armcal_result::{StoredArms, StoredObservations, open_model};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -95,7 +95,7 @@ fn readings(joints: usize, count: usize) -> Vec<Vec<f64>> {
 /// One arm of a result, and the link that its base is.
 struct Arm {
     result: PathBuf,
-    arms: PastArms,
+    arms: StoredArms,
     at: usize,
     root: &'static str,
 }
@@ -301,7 +301,7 @@ fn what_is_left_is_what_the_effects_do() {
     let said = write(&result, "urdf", &folder.join("arm.urdf"), &[]).expect("written");
     assert_eq!(said["lacks"][0], "effects: backlash:1, backlash:2, backlash:3");
     let arms = open_model(&result).expect("a result").arms().expect("its models");
-    let observed = PastObservations::open(&result.join("observations.json")).expect("observations");
+    let observed = StoredObservations::open(&result.join("observations.json")).expect("observations");
     let geometry = &arms.values[..arms.geometry.parameters().len()];
     let gaps = arms.model.gaps(&arms.values);
     assert_eq!(gaps.len(), 3);
@@ -340,7 +340,7 @@ fn what_is_left_is_what_the_effects_do() {
     let question = json!({"reader": "offsets", "path": folder.join("joint-zeros"), "joints": joints});
     let answer = answers(&python, &[&question], folder).remove(0);
     let offsets: Vec<f64> = serde_json::from_value(answer[0].clone()).expect("offsets");
-    let observed = PastObservations::open(&result.join("observations.json")).expect("observations");
+    let observed = StoredObservations::open(&result.join("observations.json")).expect("observations");
     let tips = observed.recordings.iter().flat_map(|r| &r.observations).map(|o| {
         let read: Vec<f64> = o.joint_rad.iter().zip(&offsets).map(|(q, offset)| q + offset).collect();
         let nominal = arms.geometry.tip_in_base(&arms.nominal_values, &read);

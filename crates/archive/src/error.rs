@@ -24,7 +24,7 @@ pub enum ArchiveError {
     Report(#[from] armcal_report::ReportError),
     /// Reading back a result.
     #[error(transparent)]
-    PastRun(#[from] armcal_result::PastRunError),
+    StoredRun(#[from] armcal_result::StoredResultError),
     /// Writing what is remembered of a result.
     #[error("writing the result as JSON: {0}")]
     Json(serde_json::Error),

@@ -51,17 +51,17 @@ pub fn batch(
     request: &Request<'_>,
     counter: &dyn Counter,
 ) -> Result<(Campaign, Vec<PathBuf>, usize), ArchiveError> {
-    let receipt = work_on(request, Shard::WHOLE, counter)?;
-    let skipped = receipt.skipped;
-    let (campaign, written) = put_together(vec![receipt], request.out)?;
+    let completion_marker = work_on(request, Shard::WHOLE, counter)?;
+    let skipped = completion_marker.skipped;
+    let (campaign, written) = put_together(vec![completion_marker], request.out)?;
     Ok((campaign, written, skipped))
 }
 
 /// Works on one share of the manifest, and leaves a receipt for [`reduce`].
 pub fn map(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
-    let receipt = work_on(request, shard, counter)?;
-    receipt.write(request.out)?;
-    Ok(receipt)
+    let completion_marker = work_on(request, shard, counter)?;
+    completion_marker.write(request.out)?;
+    Ok(completion_marker)
 }
 
 /// The receipt that [`map`] leaves of a share.
@@ -74,7 +74,7 @@ pub fn receipt_file(shard: Shard, out: &Path) -> PathBuf {
 /// # Errors
 /// Shares that are missing, doubled, or not of one manifest and pipeline; each by its name.
 pub fn reduce(out: &Path) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
-    put_together(shard::receipts(out)?, out)
+    put_together(shard::completion_markers(out)?, out)
 }
 
 fn work_on(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
@@ -108,8 +108,11 @@ fn work_on(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result
     Ok(Receipt::new(shard, campaign, &pipeline.name, manifest.entries.len(), done, skipped))
 }
 
-fn put_together(receipts: Vec<Receipt>, out: &Path) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
-    let (pipeline, done) = shard::together(receipts, out)?;
+fn put_together(
+    completion_markers: Vec<Receipt>,
+    out: &Path,
+) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
+    let (pipeline, done) = shard::together(completion_markers, out)?;
     let store = Store::open(out)?;
     let (mut rows, mut folders, mut failed) = (Vec::new(), Vec::new(), Vec::new());
     let mut names = BTreeSet::new();

@@ -143,7 +143,7 @@ impl Receipt {
 }
 
 /// The receipts in a campaign's folder.
-pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, ArchiveError> {
+pub(super) fn completion_markers(out: &Path) -> Result<Vec<Receipt>, ArchiveError> {
     let folder = out.join(RECEIPTS);
     let entries = std::fs::read_dir(&folder).map_err(|e| ArchiveError::Campaign {
         path: folder.clone(),
@@ -155,8 +155,9 @@ pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, ArchiveError> {
     let read = |path: &std::path::PathBuf| {
         let bad = |why: String| ArchiveError::Campaign { path: path.clone(), why };
         let text = input::read_to_string(path, input::Kind::Data).map_err(|e| bad(e.to_string()))?;
-        let receipt: Receipt = serde_json::from_str(&text).map_err(|e| bad(format!("{e}; map it again")))?;
-        Ok(receipt)
+        let completion_marker: Receipt =
+            serde_json::from_str(&text).map_err(|e| bad(format!("{e}; map it again")))?;
+        Ok(completion_marker)
     };
     paths.iter().map(read).collect()
 }
@@ -165,12 +166,15 @@ pub(super) fn receipts(out: &Path) -> Result<Vec<Receipt>, ArchiveError> {
 ///
 /// # Errors
 /// Shares of different campaigns or partitions, missing ones, a recording in two of them or in none.
-pub(super) fn together(receipts: Vec<Receipt>, out: &Path) -> Result<(String, Vec<Done>), ArchiveError> {
+pub(super) fn together(
+    completion_markers: Vec<Receipt>,
+    out: &Path,
+) -> Result<(String, Vec<Done>), ArchiveError> {
     let bad = |why: String| ArchiveError::Campaign { path: out.to_owned(), why };
-    let Some(first) = receipts.first().cloned() else {
+    let Some(first) = completion_markers.first().cloned() else {
         return Err(bad("holds no share; run `armcal map` first".into()));
     };
-    for other in &receipts {
+    for other in &completion_markers {
         let (a, b) = (first.shard, other.shard);
         if a.of != b.of {
             return Err(bad(format!(
@@ -185,8 +189,8 @@ pub(super) fn together(receipts: Vec<Receipt>, out: &Path) -> Result<(String, Ve
     }
     let mut by_shard: BTreeMap<Shard, Receipt> = BTreeMap::new();
     let (of, recordings, pipeline) = (first.shard.of, first.recordings, first.pipeline);
-    for receipt in receipts {
-        if let Some(twice) = by_shard.insert(receipt.shard, receipt) {
+    for completion_marker in completion_markers {
+        if let Some(twice) = by_shard.insert(completion_marker.shard, completion_marker) {
             return Err(bad(format!("share {} is there twice", twice.shard)));
         }
     }

@@ -1,40 +1,42 @@
 use super::*;
 
-fn receipt(number: usize, of: usize, recordings: usize) -> Receipt {
+fn completion_marker(number: usize, of: usize, recordings: usize) -> Receipt {
     let shard = Shard { number, of };
     let done = (0..recordings).filter(|i| shard.has(*i));
     let done = done.map(|index| Done::Calibrated { index, folder: format!("r{index}") }).collect();
     Receipt::new(shard, "key".into(), "p", recordings, done, 0)
 }
 
-fn refused(receipts: Vec<Receipt>) -> String {
-    together(receipts, Path::new("D")).expect_err("no whole").to_string()
+fn refused(completion_markers: Vec<Receipt>) -> String {
+    together(completion_markers, Path::new("D")).expect_err("no whole").to_string()
 }
 
 #[test]
 fn any_number_of_shares_is_the_same_in_the_end() {
     for of in [1, 3, 17] {
         // Receipts are read in the order of their file names, which is not that of the shares.
-        let mut receipts: Vec<Receipt> = (1..=of).map(|number| receipt(number, of, 10)).collect();
-        receipts.reverse();
-        let (_, done) = together(receipts, Path::new("D")).expect("a whole");
+        let mut completion_markers: Vec<Receipt> =
+            (1..=of).map(|number| completion_marker(number, of, 10)).collect();
+        completion_markers.reverse();
+        let (_, done) = together(completion_markers, Path::new("D")).expect("a whole");
         assert_eq!(done.iter().map(Done::index).collect::<Vec<_>>(), (0..10).collect::<Vec<_>>());
     }
 }
 
 #[test]
 fn what_is_missing_or_doubled_is_named() {
-    let missing = refused(vec![receipt(1, 4, 9), receipt(3, 4, 9)]);
+    let missing = refused(vec![completion_marker(1, 4, 9), completion_marker(3, 4, 9)]);
     assert!(missing.contains("2/4, 4/4 is missing"), "{missing}");
-    let twice = refused(vec![receipt(1, 2, 9), receipt(2, 2, 9), receipt(2, 2, 9)]);
+    let twice =
+        refused(vec![completion_marker(1, 2, 9), completion_marker(2, 2, 9), completion_marker(2, 2, 9)]);
     assert!(twice.contains("2/2 is there twice"), "{twice}");
-    let mixed = refused(vec![receipt(1, 2, 9), receipt(2, 3, 9)]);
+    let mixed = refused(vec![completion_marker(1, 2, 9), completion_marker(2, 3, 9)]);
     assert!(mixed.contains("1/2 and 2/3"), "{mixed}");
-    let other = Receipt { campaign: "another".into(), ..receipt(2, 2, 9) };
-    assert!(refused(vec![receipt(1, 2, 9), other]).contains("1/2 and 2/2 are not of one manifest"));
-    let mut short = receipt(2, 2, 9);
+    let other = Receipt { campaign: "another".into(), ..completion_marker(2, 2, 9) };
+    assert!(refused(vec![completion_marker(1, 2, 9), other]).contains("1/2 and 2/2 are not of one manifest"));
+    let mut short = completion_marker(2, 2, 9);
     short.done.pop();
-    assert!(refused(vec![receipt(1, 2, 9), short]).contains("recording 8 of the manifest"));
+    assert!(refused(vec![completion_marker(1, 2, 9), short]).contains("recording 8 of the manifest"));
     assert!(refused(Vec::new()).contains("no share"));
 }
 

@@ -4,7 +4,7 @@ use crate::error::ArchiveError;
 use armcal_campaign::Row;
 use armcal_recording::{atomic, input, make_folder_in};
 use armcal_report::ReportError;
-use armcal_result::{DwellMark, OBSERVATIONS_FILE, PastObservations};
+use armcal_result::{DwellMark, OBSERVATIONS_FILE, StoredObservations};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -72,7 +72,7 @@ impl Store {
     /// # Errors
     /// Observations that are missing or not readable.
     pub fn marks(&self, folder: &str) -> Result<Vec<DwellMark>, ArchiveError> {
-        let past = PastObservations::open(&self.results.join(folder).join(OBSERVATIONS_FILE))?;
+        let past = StoredObservations::open(&self.results.join(folder).join(OBSERVATIONS_FILE))?;
         Ok(past.recordings.iter().flat_map(|r| r.marks()).collect())
     }
 

@@ -28,13 +28,13 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             | Command::Pool { .. }
             | Command::View { .. }
     );
-    if !tells || !matches!(outcome, Ok(Outcome::Doubtful)) {
+    if !tells || !matches!(outcome, Ok(Outcome::CompletedWithWarnings)) {
         tell(&lost);
     }
     match outcome {
         // What a check accepts of lost data is said in its limits.
         Ok(Outcome::Done) if !lost.is_empty() && !matches!(cli.command, Command::Check(_)) => {
-            Ok(Outcome::Doubtful)
+            Ok(Outcome::CompletedWithWarnings)
         }
         outcome => outcome,
     }

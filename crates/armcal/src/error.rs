@@ -39,7 +39,7 @@ pub enum Error {
     Lab(#[from] armcal_lab::LabError),
     /// Reading back the result of an earlier run.
     #[error(transparent)]
-    PastRun(#[from] armcal_result::PastRunError),
+    StoredRun(#[from] armcal_result::StoredResultError),
     /// Two results of different recordings.
     #[error(
         "{} and {} have no dwell in common ({why}): compare results of the same recordings, and use `armcal verify` to judge a \

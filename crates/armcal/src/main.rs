@@ -25,8 +25,8 @@ fn main() -> ExitCode {
 fn ended(result: Result<Outcome, Error>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::Doubtful) => ExitCode::from(3),
-        Ok(Outcome::Broken) => ExitCode::FAILURE,
+        Ok(Outcome::CompletedWithWarnings) => ExitCode::from(3),
+        Ok(Outcome::LimitExceeded) => ExitCode::FAILURE,
         Err(error) => {
             // A closed stderr leaves nowhere to complain to; the exit code still tells.
             let _ = writeln!(

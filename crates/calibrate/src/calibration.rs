@@ -87,14 +87,14 @@ fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, Calibrate
     let near = near.as_ref();
     // Turns know nothing of each other; of several errors the first one's is told, whichever thread was first.
     let turn = |(k, held): (usize, &Vec<usize>)| judge.turn((held, judge.nominal.turns.get(k)), near);
-    let turns: Vec<Result<Turn, CalibrateError>> = holdout.turns.par_iter().enumerate().map(turn).collect();
-    let turns = turns.into_iter().collect::<Result<Vec<Turn>, CalibrateError>>()?;
+    let turns: Vec<Result<Fold, CalibrateError>> = holdout.turns.par_iter().enumerate().map(turn).collect();
+    let turns = turns.into_iter().collect::<Result<Vec<Fold>, CalibrateError>>()?;
     gathered(judge, holdout, &turns, last)
 }
 
 /// A fit outside a held-out set, completed by the frames that only the held-out set shows.
 #[derive(Clone)]
-pub(crate) struct Turn {
+pub(crate) struct Fold {
     pub fit: Fit,
     /// Parameters that give the nominal errors.
     pub nominal_values: Vec<f64>,
@@ -107,15 +107,15 @@ pub(crate) struct Turn {
     pub warnings: Vec<Warning>,
 }
 
-impl Turn {
+impl Fold {
     /// A turn that fitted all of `observations` but those `held` (indices in rising order).
-    pub fn new(fit: Fit, nominal_values: Vec<f64>, held: &[usize], observations: &[Observation]) -> Turn {
+    pub fn new(fit: Fit, nominal_values: Vec<f64>, held: &[usize], observations: &[Observation]) -> Fold {
         let mut seen = 0..;
         let is_held = |i: usize| held.binary_search(&i).is_ok();
         let all = 0..observations.len();
         let weight_of = all.clone().map(|i| if is_held(i) { None } else { seen.next() }).collect();
         let rows = all.filter(|i| !is_held(*i)).map(|i| observations[i].position_rows()).sum();
-        Turn { values: fit.values(), fit, nominal_values, weight_of, rows, warnings: Vec::new() }
+        Fold { values: fit.values(), fit, nominal_values, weight_of, rows, warnings: Vec::new() }
     }
 
     /// As [`Calibration::prediction_factor`].
@@ -133,8 +133,8 @@ impl Turn {
 fn gathered(
     judge: &Judge<'_>,
     holdout: &Holdout,
-    turns: &[Turn],
-    last: Turn,
+    turns: &[Fold],
+    last: Fold,
 ) -> Result<Calibration, CalibrateError> {
     let all: Vec<usize> = (0..judge.observations.len()).collect();
     let held: BTreeSet<usize> = holdout.turns.iter().flatten().copied().collect();
@@ -156,7 +156,7 @@ fn gathered(
     let (train, holdout_errors) = (errors(&seen), errors(&held));
     let prediction_factor = match held.is_empty() {
         true => 1.0,
-        false => turns.iter().map(Turn::prediction_factor).sum::<f64>() / turns.len() as f64,
+        false => turns.iter().map(Fold::prediction_factor).sum::<f64>() / turns.len() as f64,
     };
     let mut warnings = last.fit.warnings.clone();
     let of_turns: Vec<&Warning> =
@@ -184,8 +184,8 @@ fn gathered(
 }
 
 /// As [`Calibration::turn_sigma_ratio`]; 1 of a fixed parameter.
-fn sigma_ratios(turns: &[Turn], last: &Turn) -> Vec<f64> {
-    let ratio = |k: usize, turn: &Turn| turn.fit.estimates[k].sigma / last.fit.estimates[k].sigma;
+fn sigma_ratios(turns: &[Fold], last: &Fold) -> Vec<f64> {
+    let ratio = |k: usize, turn: &Fold| turn.fit.estimates[k].sigma / last.fit.estimates[k].sigma;
     let free = |k: &usize| last.fit.estimates[*k].sigma > 0.0;
     let largest = |k: usize| turns.iter().map(|turn| ratio(k, turn)).fold(0.0, f64::max);
     (0..last.fit.estimates.len()).map(|k| if free(&k) { largest(k) } else { 1.0 }).collect()
@@ -193,7 +193,7 @@ fn sigma_ratios(turns: &[Turn], last: &Turn) -> Vec<f64> {
 
 /// The fit to all observations, for turns that begin where it ended.
 struct All<'a> {
-    last: &'a Turn,
+    last: &'a Fold,
     /// All observations there, for several turns.
     looked: Option<Arc<Looked>>,
     /// The same at the nominal arm in its frames, where no turn knows these and the observations are very many.
@@ -215,7 +215,7 @@ impl Judge<'_> {
         &self,
         (held, nominal): (&[usize], Option<&Vec<f64>>),
         near: Option<&All<'_>>,
-    ) -> Result<Turn, CalibrateError> {
+    ) -> Result<Fold, CalibrateError> {
         let places = |is_held: bool| -> Vec<usize> {
             let all = 0..self.observations.len();
             all.filter(|i| held.binary_search(i).is_ok() == is_held).collect()
@@ -263,11 +263,11 @@ impl Judge<'_> {
             adopt(&mut fit, &frozen, &of_unseen);
             warnings.push(fitted_on_held_out(&unseen));
         }
-        Ok(Turn { warnings, ..Turn::new(fit, nominal_values, held, self.observations) })
+        Ok(Fold { warnings, ..Fold::new(fit, nominal_values, held, self.observations) })
     }
 
     /// These observations as a turn predicts them.
-    fn residuals(&self, of: &[usize], turn: &Turn, held_out: bool) -> Result<Vec<Residual>, CalibrateError> {
+    fn residuals(&self, of: &[usize], turn: &Fold, held_out: bool) -> Result<Vec<Residual>, CalibrateError> {
         let observations: Vec<&Observation> = of.iter().map(|i| &self.observations[*i]).collect();
         let at = |p: &[f64]| {
             let mut all = Vec::with_capacity(of.len());
@@ -311,7 +311,7 @@ impl Judge<'_> {
     }
 
     /// All observations where the fit to them ended, as turns that begin there will ask of it.
-    fn look<'t>(&self, last: &'t Turn, turns: usize) -> Result<All<'t>, CalibrateError> {
+    fn look<'t>(&self, last: &'t Fold, turns: usize) -> Result<All<'t>, CalibrateError> {
         if turns < 2 {
             return Ok(All { last, looked: None, frames: None });
         }

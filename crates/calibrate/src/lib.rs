@@ -29,6 +29,7 @@ mod calibration;
 mod compare;
 mod config;
 mod covariance;
+mod describe;
 mod ended;
 mod error;
 mod error_places;
@@ -66,7 +67,6 @@ pub mod tails;
 mod undetermined;
 mod whitened;
 mod wider;
-mod words;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop and tell its numbers")]

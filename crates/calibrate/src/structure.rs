@@ -38,19 +38,19 @@ impl Structure {
             let known = if known.is_empty() { vec![all()] } else { known };
             return Structure::over(known, axes, (0..axes.len()).collect());
         }
-        let mut knowers = vec![Knowers::None; problem.parameters().len()];
+        let mut knowers = vec![ParameterScope::None; problem.parameters().len()];
         for (group, known) in known.iter().enumerate() {
             known.parameters.iter().for_each(|&index| knowers[index] = knowers[index].and(group));
         }
         let is = |wanted| {
             (0..axes.len()).filter(|&axis| knowers[axes[axis].index] == wanted).collect::<Vec<usize>>()
         };
-        let (shared, nobodys) = (is(Knowers::Several), is(Knowers::None));
+        let (shared, unobserved) = (is(ParameterScope::Several), is(ParameterScope::None));
         let mut structure = Structure::over(known, axes, shared);
         // Only its prior says anything about a parameter that no observation knows.
         let columns = vec![None; 1 + structure.shared.len()];
         let alone = |axis| Group { blocks: 0..0, own: vec![axis], columns: columns.clone() };
-        structure.groups.extend(nobodys.into_iter().map(alone));
+        structure.groups.extend(unobserved.into_iter().map(alone));
         structure
     }
 
@@ -87,17 +87,17 @@ impl Structure {
 
 /// Who knows a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Knowers {
+enum ParameterScope {
     None,
     One(usize),
     Several,
 }
 
-impl Knowers {
-    fn and(self, group: usize) -> Knowers {
+impl ParameterScope {
+    fn and(self, group: usize) -> ParameterScope {
         match self {
-            Knowers::None => Knowers::One(group),
-            Knowers::One(_) | Knowers::Several => Knowers::Several,
+            ParameterScope::None => ParameterScope::One(group),
+            ParameterScope::One(_) | ParameterScope::Several => ParameterScope::Several,
         }
     }
 }

@@ -6,11 +6,11 @@
 //! is turned by the varimax rotation (Kaiser 1958), which looks for few large shares. The directions are unit vectors
 //! in units of the prior; they span the weak subspace but need not be orthogonal.
 
+use crate::describe::{self, Simplicity};
 use crate::outcome::UndeterminedDirection;
 use crate::problem::Symmetry;
 use crate::statistics::Weak;
 use crate::whitened::Axis;
-use crate::words::{self, Simplicity};
 use armcal_core::Parameter;
 use nalgebra::{DMatrix, DVector, Matrix2};
 
@@ -47,7 +47,7 @@ fn directions_of(
     let axes: Vec<Axis> = over.axes.iter().map(|&axis| all_axes[axis]).collect();
     let axes = axes.as_slice();
     let simplicity =
-        |i: usize, j: usize| words::simplicity(&parameters[axes[i].index], &parameters[axes[j].index]);
+        |i: usize, j: usize| describe::simplicity(&parameters[axes[i].index], &parameters[axes[j].index]);
     let weak = &over.basis;
     let (named, texts): (Vec<DVector<f64>>, Vec<&str>) = unseen(weak, axes, symmetries).into_iter().unzip();
     let texts = texts.into_iter().map(Some).chain(std::iter::repeat(None));
@@ -57,7 +57,7 @@ fn directions_of(
         .map(|(direction, text)| {
             let shares = shares_of(&direction, &over.information);
             let lead = shares.iter().map(|s| over.axes[s.0]).min().unwrap_or(usize::MAX);
-            let in_words = || words::describe(&shares, axes, parameters, &over.information);
+            let in_words = || describe::describe(&shares, axes, parameters, &over.information);
             let mut text = text.map_or_else(in_words, str::to_owned);
             if over.followed {
                 text += ", once what each recording has for itself may follow";

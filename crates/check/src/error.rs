@@ -25,7 +25,7 @@ pub enum CheckError {
     BadReference { path: PathBuf, problem: String },
     /// Reading back that result.
     #[error(transparent)]
-    PastRun(#[from] armcal_result::PastRunError),
+    StoredRun(#[from] armcal_result::StoredResultError),
     /// The summary that is judged.
     #[error(transparent)]
     Report(#[from] armcal_report::ReportError),

@@ -39,9 +39,9 @@ pub enum Judgement {
     /// Every limit holds: 0.
     Holds,
     /// Every limit holds, but there are doubts: 3.
-    Doubtful,
+    CompletedWithWarnings,
     /// A limit is broken: 1.
-    Broken,
+    LimitExceeded,
 }
 
 /// Judges a diagnosed run.
@@ -57,8 +57,8 @@ pub fn judge(run: &Run, limits: &Limits) -> Result<Judged, CheckError> {
     }
     let doubts = doubts(run, limits);
     let judgement = match (checks.iter().all(|c| c.holds), doubts.is_empty()) {
-        (false, _) => Judgement::Broken,
-        (true, false) => Judgement::Doubtful,
+        (false, _) => Judgement::LimitExceeded,
+        (true, false) => Judgement::CompletedWithWarnings,
         (true, true) => Judgement::Holds,
     };
     let line = line(run, &checks, &doubts);

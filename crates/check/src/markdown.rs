@@ -7,8 +7,8 @@ use super::{Judged, Judgement};
 pub fn markdown(judged: &Judged) -> String {
     let mark = match judged.judgement {
         Judgement::Holds => "✅",
-        Judgement::Doubtful => "⚠️",
-        Judgement::Broken => "❌",
+        Judgement::CompletedWithWarnings => "⚠️",
+        Judgement::LimitExceeded => "❌",
     };
     let mut page = format!("### {mark} {}\n\n", plain(&judged.line));
     page.push_str("| check | measured | limit | |\n|---|--:|--:|---|\n");

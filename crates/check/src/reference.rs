@@ -5,7 +5,7 @@ use armcal_core::{Pose, RollPitchYaw};
 use armcal_recording::input;
 use armcal_report::summary_json;
 use armcal_result::summary::SCHEMA;
-use armcal_result::{PastRun, Run};
+use armcal_result::{Run, StoredRun};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -64,7 +64,7 @@ impl Calibrated {
     pub fn open(path: &Path) -> Result<Calibrated, CheckError> {
         let bad = |problem: String| CheckError::BadReference { path: path.to_owned(), problem };
         let calibrated: Result<Calibrated, _> = if path.extension().is_some_and(|e| e == "mcap") {
-            serde_json::from_value(PastRun::open(path)?.summary)
+            serde_json::from_value(StoredRun::open(path)?.summary)
         } else {
             let file = if path.is_dir() { path.join("summary.json") } else { path.to_owned() };
             let text = input::read_to_string(&file, input::Kind::Data)

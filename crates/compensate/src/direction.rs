@@ -7,8 +7,8 @@
 //! solved again. Only the last step decides: what is returned is what the model predicts for the commanded path.
 
 use crate::inverse::{Limits, Miss, solve};
-use crate::past::Past;
 use crate::set_points::Arm;
+use crate::stored::Past;
 use armcal_core::Observation;
 use std::collections::VecDeque;
 

@@ -3,7 +3,7 @@
 use crate::{Arm, CompensateError, Compensator, Conditions, Limits, Target};
 use armcal_core::FeatureId;
 use armcal_model::Model;
-use armcal_model_file::{PastArms, PastModel};
+use armcal_model_file::{StoredArms, StoredModel};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 /// What the targets' coordinates mean.
@@ -41,7 +41,7 @@ impl TargetFrame {
     /// An orientation on a board.
     pub fn target(
         self,
-        arms: &PastArms,
+        arms: &StoredArms,
         feature: FeatureId,
         name: &str,
         (at_m, turned): (Vector3<f64>, Option<UnitQuaternion<f64>>),
@@ -75,8 +75,8 @@ pub fn held(model: &Model, tip: FeatureId, drive: &Drive) -> Vec<usize> {
 impl<'a> Compensator<'a> {
     /// Everything but the targets, of a finished run.
     pub fn of_result(
-        past: &PastModel,
-        arms: &'a PastArms,
+        past: &StoredModel,
+        arms: &'a StoredArms,
         (feature, frame): (FeatureId, TargetFrame),
         drive: &Drive,
     ) -> Compensator<'a> {

@@ -26,9 +26,9 @@ pub mod direction;
 pub mod drive;
 mod error;
 pub mod inverse;
-pub mod past;
 pub mod set_points;
 pub mod spline;
+pub mod stored;
 pub mod target;
 
 #[cfg(test)]
@@ -37,7 +37,7 @@ mod tests;
 pub use drive::{Drive, TargetFrame, held};
 pub use error::CompensateError;
 pub use inverse::Limits;
-pub use past::Past;
 pub use set_points::{Arm, Compensator, Kind, Reached, SetPoint, Underway};
 pub use spline::resample;
+pub use stored::Past;
 pub use target::{Conditions, ORIENTING_JOINTS, Target};

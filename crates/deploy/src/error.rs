@@ -14,7 +14,7 @@ pub enum DeployError {
     Model(#[from] armcal_model::ModelError),
     /// Reading back the result.
     #[error(transparent)]
-    PastRun(#[from] armcal_result::PastRunError),
+    StoredRun(#[from] armcal_result::StoredResultError),
     /// A format that cannot hold the arm.
     #[error(transparent)]
     Format(#[from] armcal_formats::FormatError),

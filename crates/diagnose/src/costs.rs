@@ -1,7 +1,7 @@
 //! What an explanation costs before it may be the answer: its freedom, and that it was picked among many.
 
+use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
-use crate::rooms::Room;
 
 /// Amplitudes that a size of the wrong sign counts as: what came out as no such mechanism can is told after what could be.
 const IMPOSSIBLE: usize = 2;
@@ -12,7 +12,7 @@ const UNLISTED: usize = 4;
 /// catalogue, and what is not listed, share evenly, and the values of a shape that was searched share that of their entry.
 #[derive(Clone, Copy)]
 pub(crate) struct Costs<'r> {
-    pub room: &'r Room,
+    pub conditioned: &'r ConditionedProblem,
     pub config: &'r DiagnosisConfig,
 }
 
@@ -22,19 +22,19 @@ impl Costs<'_> {
     }
 
     pub fn of_unlisted(self) -> f64 {
-        self.of(UNLISTED, self.config.prior_unknown, self.room.weighed.unlisted.len())
+        self.of(UNLISTED, self.config.prior_unknown, self.conditioned.weighed.unlisted.len())
     }
 
     /// Of an entry of the catalogue.
     pub fn of_entry(self, k: usize) -> f64 {
-        let entries = &self.room.weighed.entries;
+        let entries = &self.conditioned.weighed.entries;
         self.of(self.amplitudes(k), self.config.prior_catalogue, entries.len() * entries[k].tried)
     }
 
     /// What an entry of the catalogue counts as.
     pub fn amplitudes(self, k: usize) -> usize {
-        let impossible = !self.room.judge(k, self.config).impossible.is_empty();
-        self.room.weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 }
+        let impossible = !self.conditioned.judge(k, self.config).impossible.is_empty();
+        self.conditioned.weighed.amplitudes(k) + if impossible { IMPOSSIBLE } else { 0 }
     }
 
     fn of(self, amplitudes: usize, prior: f64, count: usize) -> f64 {

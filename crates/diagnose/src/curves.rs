@@ -5,11 +5,11 @@
 
 use crate::DiagnoseError;
 use crate::cells::Unlisted;
+use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems, as_candidate};
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::UnknownReport;
 use crate::problem::Candidate;
 use crate::ripple::Peak;
-use crate::rooms::{Room, Rooms, as_candidate};
 use crate::unknown::described;
 use crate::weigh::Outside;
 
@@ -24,29 +24,29 @@ pub(crate) struct Curve {
 
 /// Curves that are real with `names` in the model, the strongest first.
 pub(crate) fn error_curves(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     names: &[Candidate],
     config: &DiagnosisConfig,
 ) -> Result<Vec<Curve>, DiagnoseError> {
     let mut shapes: Vec<Candidate> = Vec::new();
     loop {
         let base: Vec<Candidate> = names.iter().chain(&shapes).cloned().collect();
-        let room = rooms.with(&base)?;
-        let explained = || room.weighed.p_nothing >= config.max_probability_nothing;
-        if shapes.len() >= room.problem.joints() || (!shapes.is_empty() && explained()) {
+        let conditioned = conditioned_problems.with(&base)?;
+        let explained = || conditioned.weighed.p_nothing >= config.max_probability_nothing;
+        if shapes.len() >= conditioned.problem.joints() || (!shapes.is_empty() && explained()) {
             break;
         }
-        let Some(best) = leading(&room, &shapes, config) else { break };
-        shapes.push(as_candidate(&best.what, &room, config));
+        let Some(best) = leading(&conditioned, &shapes, config) else { break };
+        shapes.push(as_candidate(&best.what, &conditioned, config));
     }
     let mut curves = Vec::new();
     for (k, shape) in shapes.iter().enumerate() {
         let others = shapes.iter().enumerate().filter(|(l, _)| *l != k).map(|(_, s)| s);
         let base: Vec<Candidate> = names.iter().chain(others).cloned().collect();
-        let room = rooms.with(&base)?;
-        let own = room.weighed.unlisted.iter().filter(|u| u.what.name == shape.spec);
+        let conditioned = conditioned_problems.with(&base)?;
+        let own = conditioned.weighed.unlisted.iter().filter(|u| u.what.name == shape.spec);
         let best = own.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
-        if let Some(report) = best.and_then(|u| described(&room, u, config)) {
+        if let Some(report) = best.and_then(|u| described(&conditioned, u, config)) {
             curves.push(Curve { candidate: shape.clone(), report });
         }
     }
@@ -65,8 +65,12 @@ fn share_ripples(curves: &mut [Curve]) {
 }
 
 /// The best joint over its own angle that predicts; the first must be as good as the best cell of all.
-fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) -> Option<&'r Outside> {
-    let weighed = &room.weighed;
+fn leading<'r>(
+    conditioned: &'r ConditionedProblem,
+    taken: &[Candidate],
+    config: &DiagnosisConfig,
+) -> Option<&'r Outside> {
+    let weighed = &conditioned.weighed;
     // Joints of one make err alike: after a first curve the next need not lead all cells, only predict.
     let limit = match taken.is_empty() {
         true => weighed.best_cell()?.ln_evidence - config.margin_nats,
@@ -79,7 +83,7 @@ fn leading<'r>(room: &'r Room, taken: &[Candidate], config: &DiagnosisConfig) ->
     });
     let mut own: Vec<&Outside> = own.collect();
     own.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
-    own.into_iter().find(|u| room.predicts(u, config))
+    own.into_iter().find(|u| conditioned.predicts(u, config))
 }
 
 /// Whether a joint errs over its own angle.

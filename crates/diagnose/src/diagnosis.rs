@@ -103,7 +103,7 @@ pub struct Diagnosis {
     /// What the user should know.
     pub warnings: Vec<Warning>,
     /// What the gate asked of a name.
-    pub gate: Gate,
+    pub gate: SignificanceTest,
     /// What the choice is worth on points that had no part in it, where it was made again ([`crate::nested`]).
     pub nested: Option<Nested>,
     /// Why that was not asked, where a user should know.
@@ -133,7 +133,7 @@ impl Diagnosis {
 
 /// The bootstrap that a name must pass.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Gate {
+pub struct SignificanceTest {
     /// Sign-flipped copies of the data.
     pub resamplings: usize,
     /// The largest family-wise p-value of a name.

@@ -5,19 +5,19 @@
 //! joint that has several names is asked once more: one takes their place where the model with it says as much of dwells that it did not see.
 
 use crate::DiagnoseError;
+use crate::conditioned_problems::ConditionedProblems;
 use crate::config::DiagnosisConfig;
 use crate::forward::{Accepted, named};
 use crate::problem::Candidate;
-use crate::rooms::Rooms;
 use crate::search::{Found, going_on};
 
 /// The same with one name for several of a target, wherever that says as much.
 pub(crate) fn fewer(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     mut found: Found,
     config: &DiagnosisConfig,
 ) -> Result<Found, DiagnoseError> {
-    while let Some(simpler) = simpler(rooms, &found.accepted, config)? {
+    while let Some(simpler) = simpler(conditioned_problems, &found.accepted, config)? {
         found = simpler;
     }
     Ok(found)
@@ -25,7 +25,7 @@ pub(crate) fn fewer(
 
 /// With one name for several of the first target for which that says as much; none where there is no such target.
 fn simpler(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     accepted: &[Accepted],
     config: &DiagnosisConfig,
 ) -> Result<Option<Found>, DiagnoseError> {
@@ -40,17 +40,22 @@ fn simpler(
         if own.len() < 2 || own.iter().any(|c| c.known.is_some()) {
             continue;
         }
-        let room = rooms.with(&others)?;
-        let ranked = room.weighed.ranking().into_iter().map(|k| &room.weighed.entries[k].candidate);
+        let conditioned = conditioned_problems.with(&others)?;
+        let ranked =
+            conditioned.weighed.ranking().into_iter().map(|k| &conditioned.weighed.entries[k].candidate);
         let Some(one) = ranked.into_iter().find(|c| c.target == target && !c.is_group()) else { continue };
         let with_one = [others, vec![one.clone()]].concat();
-        let (Some(before), Some(after)) = (rooms.score(&names, &room), rooms.score(&with_one, &room)) else {
+        let (Some(before), Some(after)) = (
+            conditioned_problems.score(&names, &conditioned),
+            conditioned_problems.score(&with_one, &conditioned),
+        ) else {
             continue;
         };
         if before.above(&after).nats >= config.margin_nats {
             continue;
         }
-        let again = going_on(rooms, &with_one, config)?.filter(|again| again.accepted.len() < names.len());
+        let again = going_on(conditioned_problems, &with_one, config)?
+            .filter(|again| again.accepted.len() < names.len());
         if again.is_some() {
             return Ok(again);
         }

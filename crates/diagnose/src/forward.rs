@@ -1,11 +1,11 @@
 //! More than one missing effect: forward steps with a stop rule, then every effect judged again among the others.
 
 use crate::DiagnoseError;
+use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
 use crate::events::moved;
 use crate::judge::{Grade, Judged};
 use crate::problem::{Candidate, Problem};
-use crate::rooms::{Room, Rooms};
 use crate::score::Score;
 use crate::settle::{Instead, Scored};
 use crate::weigh::Weighed;
@@ -27,7 +27,7 @@ pub(crate) struct Accepted {
     /// Its judgement in the context of the others.
     pub judged: Judged,
     /// That context.
-    pub room: Rc<Room>,
+    pub conditioned: Rc<ConditionedProblem>,
     /// How far its name can be trusted.
     pub grade: Grade,
     /// Names that the data do not tell from it, and that the user's knowledge of the arm does.
@@ -46,14 +46,14 @@ impl Accepted {
 
     /// Fall of the squared residual by it beside the others, declared noise = 1.
     pub fn fall(&self) -> f64 {
-        self.judged.own().score * self.room.weighed.scale.powi(2)
+        self.judged.own().score * self.conditioned.weighed.scale.powi(2)
     }
 
     /// Whether nothing else is clearly better beside the others.
     pub fn leads(&self, config: &DiagnosisConfig) -> bool {
         let detail = self.judged.detail(config);
         let own = &self.judged.score;
-        leading(&self.room, config).first().is_none_or(|(_, best)| !best.above(own).is_clear(detail))
+        leading(&self.conditioned, config).first().is_none_or(|(_, best)| !best.above(own).is_clear(detail))
     }
 }
 
@@ -82,13 +82,13 @@ pub(crate) fn named(accepted: &[Accepted]) -> Vec<Candidate> {
 }
 
 /// Steps that were confirmed before, with the problem that they leave.
-pub(crate) fn known(names: &[Candidate], rest: &Room) -> Vec<Step> {
+pub(crate) fn known(names: &[Candidate], rest: &ConditionedProblem) -> Vec<Step> {
     names.iter().map(|c| Step::known(c.clone(), rest.weighed.base.rss)).collect()
 }
 
 /// Judges every step among the others and drops the weakest until all may be named. `cells` stay in the base.
 pub(crate) fn confirm(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     mut steps: Vec<Step>,
     cells: &[Candidate],
     config: &DiagnosisConfig,
@@ -104,17 +104,18 @@ pub(crate) fn confirm(
         let all: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
         for (k, own) in all.iter().enumerate() {
             let others = [all_but(&all, k), cells.to_vec()].concat();
-            let room = rooms.with(&others)?;
-            let weighed = &room.weighed;
+            let conditioned = conditioned_problems.with(&others)?;
+            let weighed = &conditioned.weighed;
             let Some(entry) = entry_of(weighed, own) else {
                 weakest = Some((f64::NEG_INFINITY, k));
                 break;
             };
-            let mut verdict = room.judge(entry, config);
+            let mut verdict = conditioned.judge(entry, config);
             if verdict.grade(config) < Grade::Named
-                && let Some(score) = rooms.score(&[others, vec![own.clone()]].concat(), &room)
+                && let Some(score) =
+                    conditioned_problems.score(&[others, vec![own.clone()]].concat(), &conditioned)
             {
-                verdict.refitted(score, room.nothing());
+                verdict.refitted(score, conditioned.nothing());
             }
             let (grade, nats) = (verdict.grade(config), verdict.gain.nats);
             if grade == Grade::Refused && weakest.is_none_or(|w| nats < w.0) {
@@ -124,7 +125,7 @@ pub(crate) fn confirm(
             judged.push(Accepted {
                 candidate,
                 judged: verdict,
-                room: room.clone(),
+                conditioned: conditioned.clone(),
                 grade,
                 set: vec![entry],
                 instead_of: Vec::new(),
@@ -156,14 +157,14 @@ fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
 }
 
 /// Entries that the weighing likes best, each name once, with their scores: those first that are worth most.
-pub(crate) fn leading(room: &Room, config: &DiagnosisConfig) -> Vec<(usize, Score)> {
-    let weighed = &room.weighed;
+pub(crate) fn leading(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Vec<(usize, Score)> {
+    let weighed = &conditioned.weighed;
     let mut names: Vec<usize> = Vec::new();
     for k in weighed.ranking() {
         let new = names.iter().all(|n| !weighed.one_name(*n, k));
         names.extend((new && names.len() < LEADING).then_some(k));
     }
-    let mut scored: Vec<(usize, Score)> = names.into_iter().map(|k| (k, room.score_of(k))).collect();
+    let mut scored: Vec<(usize, Score)> = names.into_iter().map(|k| (k, conditioned.score_of(k))).collect();
     let worth = |(k, score): &(usize, Score)| score.worth(config.margin_nats * weighed.amplitudes(*k) as f64);
     scored.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     scored
@@ -171,7 +172,7 @@ pub(crate) fn leading(room: &Room, config: &DiagnosisConfig) -> Vec<(usize, Scor
 
 /// Accepts the best candidate again and again while it is promising. `cells` stay in the base.
 pub(crate) fn forward(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     mut steps: Vec<Step>,
     cells: &[Candidate],
     config: &DiagnosisConfig,
@@ -182,33 +183,36 @@ pub(crate) fn forward(
     while steps.len() < config.max_effects {
         let mut accepted: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
         accepted.extend_from_slice(cells);
-        let room = match rooms.with(&accepted) {
-            Ok(room) => room,
+        let conditioned = match conditioned_problems.with(&accepted) {
+            Ok(conditioned) => conditioned,
             // The last one cannot be fitted beside the others: the search ends without it.
             Err(_) if !steps.is_empty() => {
-                rooms.dropped.extend(steps.pop().map(|step| step.candidate.spec));
+                conditioned_problems.dropped.extend(steps.pop().map(|step| step.candidate.spec));
                 break;
             }
             Err(error) => return Err(error),
         };
-        let weighed = &room.weighed;
+        let weighed = &conditioned.weighed;
         if weighed.p_nothing >= config.max_probability_nothing {
             break;
         }
-        let Some((top, _)) = leading(&room, config).into_iter().next() else { break };
-        let mut judged = room.judge(top, config);
+        let Some((top, _)) = leading(&conditioned, config).into_iter().next() else { break };
+        let mut judged = conditioned.judge(top, config);
         let mut named = judged.grade(config) == Grade::Named;
         let entry = &weighed.entries[judged.entry];
         // Far from the fit one step is short, and an unlisted shape has more of them.
         if !named
-            && let Some(score) =
-                rooms.score(&[accepted.clone(), vec![entry.candidate.clone()]].concat(), &room)
+            && let Some(score) = conditioned_problems
+                .score(&[accepted.clone(), vec![entry.candidate.clone()]].concat(), &conditioned)
         {
-            judged.refitted(score, room.nothing());
+            judged.refitted(score, conditioned.nothing());
             named = judged.grade(config) == Grade::Named;
         }
         // Before an unlisted shape beats it, it may show what it does at its own size.
-        if !named && entry.ln_evidence >= config.margin_nats && rooms.refine(&accepted, &entry.candidate)? {
+        if !named
+            && entry.ln_evidence >= config.margin_nats
+            && conditioned_problems.refine(&accepted, &entry.candidate)?
+        {
             continue;
         }
         if !judged.promising(config) {
@@ -226,9 +230,9 @@ pub(crate) fn forward(
         let unlisted_nats = judged.unlisted.as_ref().map_or(0.0, |u| gain_nats + u.above.nats);
         let candidate = entry.candidate.clone();
         let step = Step { candidate, named_at_once: named, gain_nats, unlisted_nats, fall };
-        steps.extend(one_by_one(step, &room.problem));
+        steps.extend(one_by_one(step, &conditioned.problem));
         if cells.is_empty() {
-            drop_superseded(&mut steps, rooms, &room, config);
+            drop_superseded(&mut steps, conditioned_problems, &conditioned, config);
         }
         let mut names: Vec<String> = steps.iter().map(|s| s.candidate.spec.clone()).collect();
         names.sort();
@@ -269,12 +273,17 @@ fn one_by_one(step: Step, problem: &Problem) -> Vec<Step> {
 }
 
 /// Backward drop: an earlier effect without which, the later ones in the model, a refit says as much leaves.
-fn drop_superseded(steps: &mut Vec<Step>, rooms: &mut Rooms<'_>, room: &Room, config: &DiagnosisConfig) {
+fn drop_superseded(
+    steps: &mut Vec<Step>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
+    conditioned: &ConditionedProblem,
+    config: &DiagnosisConfig,
+) {
     let mut k = 0;
     while k + 1 < steps.len() {
         let all: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
-        let without = rooms.score(&all_but(&all, k), room);
-        let Some((with, without)) = rooms.score(&all, room).zip(without) else { break };
+        let without = conditioned_problems.score(&all_but(&all, k), conditioned);
+        let Some((with, without)) = conditioned_problems.score(&all, conditioned).zip(without) else { break };
         if with.above(&without).nats < config.margin_nats {
             steps.remove(k);
         } else {

@@ -1,10 +1,11 @@
 //! The inner room as one call: from a problem (and a way to refit it) to the whole diagnosis.
 
+use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
 use crate::crossval::{by_place, errors_m, left_out};
 use crate::diagnosis::{
-    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, Gate, JudgedOn, NOT_LISTED, NotTestable, Rival,
-    UnknownReport, Verdict,
+    BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NotTestable, Rival,
+    SignificanceTest, UnknownReport, Verdict,
 };
 use crate::events::{passing, together};
 use crate::forward::{Accepted, named};
@@ -15,7 +16,6 @@ use crate::problem::{Candidate, Part, Problem};
 use crate::ranking::Ranking;
 use crate::refit::Refit;
 use crate::reports::{candidate_reports, not_testable, parameters};
-use crate::rooms::{Room, Rooms};
 use crate::scatter::Scatter;
 use crate::search::{Search, from_nothing, search};
 use crate::settle::{Instead, settle};
@@ -48,8 +48,8 @@ pub(crate) fn propose(
     let whole = refit.problem(&[])?;
     whole.check()?;
     let Cleaned { keep, problem, weighed, .. } = set_aside(whole.evaluable(&mut BTreeSet::new()), config);
-    let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
-    Ok(named(&from_nothing(&mut rooms, config)?.accepted))
+    let mut conditioned_problems = ConditionedProblems::new(refit, keep, (problem, weighed), config);
+    Ok(named(&from_nothing(&mut conditioned_problems, config)?.accepted))
 }
 
 /// [`diagnose_problem`] with names that were `proposed`.
@@ -64,15 +64,15 @@ pub(crate) fn diagnose_beyond(
     let mut dropped = BTreeSet::new();
     let Cleaned { keep, aside, problem, weighed } = set_aside(whole.evaluable(&mut dropped), config);
     let dwells = keep.len();
-    let mut rooms = Rooms::new(refit, keep, (problem, weighed), config);
-    rooms.dropped = dropped;
-    let mut search = search(&mut rooms, proposed, config)?;
-    settle(&mut search, &mut rooms, config)?;
-    let room = rooms.with(&[])?;
-    let ranking = Ranking::of(&search, &room, &mut rooms, config);
-    let before = Before::of(&room, ranking, config);
+    let mut conditioned_problems = ConditionedProblems::new(refit, keep, (problem, weighed), config);
+    conditioned_problems.dropped = dropped;
+    let mut search = search(&mut conditioned_problems, proposed, config)?;
+    settle(&mut search, &mut conditioned_problems, config)?;
+    let conditioned = conditioned_problems.with(&[])?;
+    let ranking = Ranking::of(&search, &conditioned, &mut conditioned_problems, config);
+    let before = Before::of(&conditioned, ranking, config);
     let mut diagnosis = assemble(before, (dwells, aside), &search, config);
-    diagnosis.warnings.extend(not_evaluated(&rooms.dropped));
+    diagnosis.warnings.extend(not_evaluated(&conditioned_problems.dropped));
     Ok(diagnosis)
 }
 
@@ -102,16 +102,16 @@ struct Before {
 }
 
 impl Before {
-    fn of(room: &Room, ranking: Ranking, config: &DiagnosisConfig) -> Before {
-        let Room { problem, weighed, .. } = room;
-        let top = weighed.ranking().first().map(|top| room.judge(*top, config));
+    fn of(conditioned: &ConditionedProblem, ranking: Ranking, config: &DiagnosisConfig) -> Before {
+        let ConditionedProblem { problem, weighed, .. } = conditioned;
+        let top = weighed.ranking().first().map(|top| conditioned.judge(*top, config));
         let top = top.as_ref();
         Before {
             p_nothing: ranking.p_nothing,
             p_unlisted: ranking.p_unlisted,
             p_adjusted: top.map_or(1.0, |t| t.own().p_adjusted),
             tried_unlisted: weighed.unlisted.len(),
-            candidates: candidate_reports(room, &ranking.explanations, top, config),
+            candidates: candidate_reports(conditioned, &ranking.explanations, top, config),
             cannot_tell_apart: confused(problem, weighed, config),
             not_testable: not_testable(problem, weighed),
             floor_mm: floor_mm(problem),
@@ -164,7 +164,7 @@ fn assemble(
         effects,
         unknown: unlisted.first().cloned(),
         unlisted,
-        gate: Gate { resamplings: config.resamplings, max_p_adjusted: config.max_p_adjusted },
+        gate: SignificanceTest { resamplings: config.resamplings, max_p_adjusted: config.max_p_adjusted },
         nested: None,
         not_chosen_again: None,
     };
@@ -191,7 +191,7 @@ fn floor_mm(problem: &Problem) -> f64 {
 }
 
 fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
-    let (judged, weighed) = (&a.judged, &a.room.weighed);
+    let (judged, weighed) = (&a.judged, &a.conditioned.weighed);
     let name = |k: &usize| weighed.entries[*k].candidate.spec.clone();
     let mut set: Vec<String> = a.set.iter().map(name).collect();
     if a.grade == Grade::OrUnlisted || seen_by_the_sensor_alone(a) {
@@ -219,7 +219,7 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
 /// The best listed explanation that is no name of a found effect: how far behind, and what it does to places the linearised fit
 /// did not see.
 fn rival(a: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
-    let Room { problem, weighed, .. } = a.room.as_ref();
+    let ConditionedProblem { problem, weighed, .. } = a.conditioned.as_ref();
     let own = a.ranked.iter().find(|s| s.what == Instead::Entry(a.judged.entry))?;
     let others = a.ranked.iter().filter_map(|s| match s.what {
         Instead::Entry(k) if !a.set.contains(&k) => Some((k, own.score.above(&s.score))),
@@ -232,7 +232,7 @@ fn rival(a: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
         name: weighed.entries[k].candidate.spec.clone(),
         behind_nats: behind.nats,
         behind_se: behind.se,
-        places: weighed.gain(problem, &effect, &a.room.exam().folds, config),
+        places: weighed.gain(problem, &effect, &a.conditioned.exam().folds, config),
     })
 }
 
@@ -335,7 +335,7 @@ fn warnings(
             );
             add("event-or-sensor", a.candidate.spec.clone(), message);
         }
-        if a.candidate.toggle == Toggle::Recording && one_load(&a.room.problem) {
+        if a.candidate.toggle == Toggle::Recording && one_load(&a.conditioned.problem) {
             let message = format!(
                 "{}: something changed between dwells; a load that is not declared, another tool or another arm in a recording \
                  changes them too: check `load_kg`, and that all recordings are of this arm with this tool",
@@ -363,7 +363,7 @@ fn warnings(
 /// Whether something was displaced in some dwells and not after them, and no cavity held the tip in any of these: a fault of the
 /// sensor displaces the same.
 fn seen_by_the_sensor_alone(a: &Accepted) -> bool {
-    let dwells = &a.room.problem.dwells;
+    let dwells = &a.conditioned.problem.dwells;
     let shifted = SHIFTS.contains(&a.candidate.family.as_str());
     let during = passing(&a.candidate.spec).filter(|_| shifted);
     during.is_some_and(|during| {
@@ -378,7 +378,7 @@ fn one_load(problem: &Problem) -> bool {
 
 /// Dwells whose arrival direction an accepted direction effect contradicts.
 fn direction_suspects(a: &Accepted) -> Vec<DwellId> {
-    let (problem, weighed) = (&a.room.problem, &a.room.weighed);
+    let (problem, weighed) = (&a.conditioned.problem, &a.conditioned.weighed);
     let projection = &weighed.base;
     let columns = a.candidate.columns.dense(&problem.dwells, 1.0 / weighed.scale);
     let fitted = crate::confusion::one_step(&projection.gram(&columns), 1.0);

@@ -1,6 +1,7 @@
 //! May an entry be named? The gate, the score of what it predicts, what is not listed, pairs of visits.
 
 use crate::bootstrap::{Direction, Significance, wild_cluster};
+use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
 use crate::confusion::{OneStep, Signature, half_width, one_step};
 use crate::contrasts::{Contrast, contrast};
@@ -9,7 +10,6 @@ use crate::evidence::{best_amplitude, coefficients};
 use crate::places::units;
 use crate::problem::{Amplitude, Problem};
 use crate::projection::Gram;
-use crate::rooms::Room;
 use crate::scatter::Scatter;
 use crate::score::{Difference, Score};
 use crate::weigh::Weighed;
@@ -138,10 +138,10 @@ pub(crate) enum Grade {
 }
 
 /// The significance of every entry of a room, among all that was tried.
-pub(crate) fn significance(room: &Room, config: &DiagnosisConfig) -> Vec<Significance> {
-    let Room { problem, weighed, .. } = room;
+pub(crate) fn significance(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Vec<Significance> {
+    let ConditionedProblem { problem, weighed, .. } = conditioned;
     let directions = gate_directions(problem, weighed);
-    let clusters = clusters(problem, &room.scatter);
+    let clusters = clusters(problem, &conditioned.scatter);
     let mut all = wild_cluster(&weighed.base, &directions, (&problem.dwells, &clusters), config);
     all.truncate(weighed.entries.len());
     all
@@ -149,12 +149,12 @@ pub(crate) fn significance(room: &Room, config: &DiagnosisConfig) -> Vec<Signifi
 
 /// Judges an entry of a room, given the significance of all.
 pub(crate) fn judge(
-    room: &Room,
+    conditioned: &ConditionedProblem,
     significance: &[Significance],
     entry: usize,
     config: &DiagnosisConfig,
 ) -> Judged {
-    let Room { problem, weighed, .. } = room;
+    let ConditionedProblem { problem, weighed, .. } = conditioned;
     let projection = &weighed.base;
     let gram = weighed.entries[entry].gram.clone();
     let fitted = one_step(&gram, 1.0);
@@ -164,8 +164,8 @@ pub(crate) fn judge(
 
     let columns = &candidate.columns;
     let effect = columns.dense(&problem.dwells, 1.0);
-    let score = room.score_of(entry);
-    let places = weighed.gain(problem, &effect, &room.exam().folds, config);
+    let score = conditioned.score_of(entry);
+    let places = weighed.gain(problem, &effect, &conditioned.exam().folds, config);
     let groups = by_recording(problem);
     let recordings = (groups.len() > 1).then(|| weighed.gain(problem, &effect, &groups, config));
 
@@ -174,8 +174,8 @@ pub(crate) fn judge(
     let normal = armcal_calibrate::gram(&problem.geometry);
     let base = &problem.residual - &problem.geometry * base_fit(problem, &normal, weighed.scale);
     let contrast = contrast(problem, &base, candidate, &effect, theta, theta_sigma, config);
-    let unlisted = Unlisted::beside(room, entry, &score, config);
-    let gain = score.above(room.nothing());
+    let unlisted = Unlisted::beside(conditioned, entry, &score, config);
+    let gain = score.above(conditioned.nothing());
     let significance = significance.to_vec();
     let cost_nats = config.margin_nats * weighed.amplitudes(entry) as f64;
     Judged {
@@ -195,9 +195,14 @@ pub(crate) fn judge(
 
 impl Unlisted {
     /// The best of a room beside an entry of this score.
-    fn beside(room: &Room, entry: usize, own: &Score, config: &DiagnosisConfig) -> Option<Unlisted> {
-        let Room { problem, weighed, .. } = room;
-        let (best, score) = room.best_unlisted(config)?;
+    fn beside(
+        conditioned: &ConditionedProblem,
+        entry: usize,
+        own: &Score,
+        config: &DiagnosisConfig,
+    ) -> Option<Unlisted> {
+        let ConditionedProblem { problem, weighed, .. } = conditioned;
+        let (best, score) = conditioned.best_unlisted(config)?;
         let above = score.above(own);
         let columns = weighed.dense(&best.what.columns, problem);
         let gram = weighed.base.gram(&columns);

@@ -46,7 +46,7 @@ pub fn nested(
     let Some(refitted) = &found.refitted else { return Ok(None) };
     let turns = holdout_turns(model, observations, holdout)?;
     let config = DiagnosisConfig { resamplings: config.resamplings.min(RESAMPLINGS), ..config.clone() };
-    let done: Vec<Result<Turn, DiagnoseError>> =
+    let done: Vec<Result<Fold, DiagnoseError>> =
         turns.par_iter().map(|held| turn(calibrated, held, &config)).collect();
     let done = done.into_iter().collect::<Result<Vec<_>, _>>()?;
     let after: BTreeMap<DwellId, f64> =
@@ -60,7 +60,7 @@ pub fn nested(
 }
 
 /// What was chosen without some points, and the errors that it leaves on them.
-struct Turn {
+struct Fold {
     chosen: Vec<String>,
     errors_m: BTreeMap<DwellId, f64>,
 }
@@ -69,7 +69,7 @@ fn turn(
     calibrated: &Calibrated<'_>,
     held: &[usize],
     config: &DiagnosisConfig,
-) -> Result<Turn, DiagnoseError> {
+) -> Result<Fold, DiagnoseError> {
     let Calibrated { model, observations, session, fit, .. } = *calibrated;
     let is_held = |i: usize| held.binary_search(&i).is_ok();
     let seen: Vec<Observation> =
@@ -86,7 +86,7 @@ fn turn(
     let dwells = held.iter().map(|i| observations[*i].dwell).map(|d| [d.recording, d.dwell]).collect();
     let predicted = calibrate(&model, observations, fit, &HoldoutConfig::Dwells { dwells })?;
     let chosen = effects.iter().map(ToString::to_string).collect();
-    Ok(Turn { chosen, errors_m: held_out_errors_m(&predicted) })
+    Ok(Fold { chosen, errors_m: held_out_errors_m(&predicted) })
 }
 
 /// The hold-out once more among what a turn sees, or folds of it where too little is left for that.

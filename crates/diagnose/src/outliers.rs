@@ -95,7 +95,7 @@ fn predicted(
     explanation: Option<&Columns>,
     config: &DiagnosisConfig,
 ) -> (DVector<f64>, Vec<f64>) {
-    let effect = explanation.map(|columns| weighed.tamed(columns, problem, config));
+    let effect = explanation.map(|columns| weighed.regularised(columns, problem, config));
     let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
     let [fitted, left] = fitted_and_left_out(problem, effect.as_ref(), &alone, weighed.scale);
     let square = studentised(problem, &left, &fitted);

@@ -1,10 +1,10 @@
 //! Every explanation that was scored, in one order: the answer first, then what may stand in its place.
 
+use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::Standing;
 use crate::forward::{Accepted, leading};
 use crate::problem::Candidate;
-use crate::rooms::{Room, Rooms};
 use crate::score::{Score, weights};
 use crate::search::Search;
 use crate::settle::Instead;
@@ -36,19 +36,24 @@ pub(crate) struct Ranking {
 
 impl Ranking {
     /// Of a search that began in `room`, the one without effects.
-    pub fn of(search: &Search, room: &Room, rooms: &mut Rooms<'_>, config: &DiagnosisConfig) -> Ranking {
+    pub fn of(
+        search: &Search,
+        conditioned: &ConditionedProblem,
+        conditioned_problems: &mut ConditionedProblems<'_>,
+        config: &DiagnosisConfig,
+    ) -> Ranking {
         match search.accepted.is_empty() {
-            true => Ranking::of_nothing(room, config),
-            false => Ranking::of_answer(&search.accepted, room, rooms, config),
+            true => Ranking::of_nothing(conditioned, config),
+            false => Ranking::of_answer(&search.accepted, conditioned, conditioned_problems, config),
         }
     }
 
     /// Where no name was found: what came nearest, by itself.
-    fn of_nothing(room: &Room, config: &DiagnosisConfig) -> Ranking {
-        let listed = leading(room, config);
-        let unlisted = room.best_unlisted(config).map(|(_, score)| score);
-        let costs = room.costs(config);
-        let mut scores = vec![(room.nothing(), costs.of_nothing())];
+    fn of_nothing(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Ranking {
+        let listed = leading(conditioned, config);
+        let unlisted = conditioned.best_unlisted(config).map(|(_, score)| score);
+        let costs = conditioned.costs(config);
+        let mut scores = vec![(conditioned.nothing(), costs.of_nothing())];
         scores.extend(unlisted.iter().map(|score| (score, costs.of_unlisted())));
         scores.extend(listed.iter().map(|(k, score)| (score, costs.of_entry(*k))));
         let weights = weights(&scores, config);
@@ -57,9 +62,9 @@ impl Ranking {
         rows.sort_by(|a, b| b.1.total_cmp(a.1));
         let best = rows.first().map(|row| row.0.1.clone());
         let row = |((k, score), weight): (&(usize, Score), &f64)| Explanation {
-            effects: vec![room.weighed.entries[*k].candidate.spec.clone()],
+            effects: vec![conditioned.weighed.entries[*k].candidate.spec.clone()],
             standing: Standing::of(best.as_ref().unwrap_or(score), score, *weight, false),
-            p_adjusted: room.judge(*k, config).own().p_adjusted,
+            p_adjusted: conditioned.judge(*k, config).own().p_adjusted,
         };
         Ranking {
             explanations: rows.into_iter().map(row).collect(),
@@ -70,12 +75,12 @@ impl Ranking {
 
     fn of_answer(
         accepted: &[Accepted],
-        room: &Room,
-        rooms: &mut Rooms<'_>,
+        conditioned: &ConditionedProblem,
+        conditioned_problems: &mut ConditionedProblems<'_>,
         config: &DiagnosisConfig,
     ) -> Ranking {
         let answer: Vec<Candidate> = accepted.iter().map(|a| a.candidate.clone()).collect();
-        let scored = rooms.score(&answer, room);
+        let scored = conditioned_problems.score(&answer, conditioned);
         let shares: Vec<f64> =
             accepted.iter().map(|a| a.probability(|w| w == Instead::Entry(a.judged.entry))).collect();
         let of_others = |i: usize| -> f64 {
@@ -104,17 +109,17 @@ impl Ranking {
                     continue;
                 }
                 let mut swapped = answer.clone();
-                swapped[i] = a.room.weighed.entries[k].candidate.clone();
-                let score = rooms.score(&swapped, room);
+                swapped[i] = a.conditioned.weighed.entries[k].candidate.clone();
+                let score = conditioned_problems.score(&swapped, conditioned);
                 let probability = other.weight * of_others(i);
                 let p = p_others(i).max(p_of(a, k));
                 explanations.extend(score.map(|s| row(&swapped, p, &s, probability, a.set.contains(&k))));
             }
         }
-        for (k, score) in leading(room, config) {
-            let alone = std::slice::from_ref(&room.weighed.entries[k].candidate);
+        for (k, score) in leading(conditioned, config) {
+            let alone = std::slice::from_ref(&conditioned.weighed.entries[k].candidate);
             let known = explanations.iter().any(|e| e.spec() == alone[0].spec);
-            let p = room.judge(k, config).own().p_adjusted;
+            let p = conditioned.judge(k, config).own().p_adjusted;
             explanations.extend((!known).then(|| row(alone, p, &score, 0.0, false)));
         }
         let of_answer = |e: &Explanation| e.standing.in_answer;

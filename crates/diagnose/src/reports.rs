@@ -2,6 +2,7 @@
 
 use crate::bootstrap::Significance;
 use crate::combination::{Combination, combination};
+use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
 use crate::confusion::{half_width, one_step, smallest_seen};
 use crate::crossval::{by_place, compare, left_out};
@@ -9,7 +10,6 @@ use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterRepor
 use crate::judge::Judged;
 use crate::problem::{Amplitude, Candidate, Columns, Problem};
 use crate::ranking::Explanation;
-use crate::rooms::Room;
 use crate::weigh::Weighed;
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
@@ -58,12 +58,12 @@ const AT_NO_SIZE: f64 = 1e3;
 
 /// Explanations as the judge ranks them, and behind them the rest of the catalogue.
 pub(crate) fn candidate_reports(
-    room: &Room,
+    conditioned: &ConditionedProblem,
     ranking: &[Explanation],
     top: Option<&Judged>,
     config: &DiagnosisConfig,
 ) -> Vec<CandidateReport> {
-    let Room { problem, weighed, .. } = room;
+    let ConditionedProblem { problem, weighed, .. } = conditioned;
     let groups = by_place(problem);
     let before = left_out(problem, None, &groups, weighed.scale);
     let entry = |spec: &str| weighed.entries.iter().position(|e| e.candidate.spec == spec);
@@ -72,7 +72,7 @@ pub(crate) fn candidate_reports(
         let members: Vec<usize> = explanation.effects.iter().filter_map(|spec| entry(spec)).collect();
         let alone = entry(&explanation.spec());
         let Some(of) = alone.or_else(|| members.first().copied()) else { continue };
-        let mut report = of_entry(room, of, top);
+        let mut report = of_entry(conditioned, of, top);
         report.standing = Some(explanation.standing);
         report.p_adjusted = explanation.p_adjusted;
         let whole = if alone.is_some() { vec![of] } else { members };
@@ -82,22 +82,22 @@ pub(crate) fn candidate_reports(
             let after = left_out(problem, Some(&together), &groups, weighed.scale);
             let held = compare(problem, &before, &after, &groups, config);
             report.holdout_mm = Some(BeforeAfter { before: held.before, after: held.after });
-            report.same_to_the_data.extend(alike(room, of, config));
+            report.same_to_the_data.extend(alike(conditioned, of, config));
         }
         if alone.is_none() {
-            report.become_several(explanation, whole.iter().map(|k| of_entry(room, *k, top)));
+            report.become_several(explanation, whole.iter().map(|k| of_entry(conditioned, *k, top)));
         }
         reports.push(report);
     }
     let taken: Vec<String> = reports.iter().map(|r| r.spec.clone()).collect();
-    let rest = weighed.ranking().into_iter().map(|k| of_entry(room, k, top));
+    let rest = weighed.ranking().into_iter().map(|k| of_entry(conditioned, k, top));
     reports.extend(rest.filter(|r| !taken.contains(&r.spec)));
     reports
 }
 
 /// One entry by itself: its sizes in one step, and what these data could show of it.
-fn of_entry(room: &Room, k: usize, top: Option<&Judged>) -> CandidateReport {
-    let Room { weighed, .. } = room;
+fn of_entry(conditioned: &ConditionedProblem, k: usize, top: Option<&Judged>) -> CandidateReport {
+    let ConditionedProblem { weighed, .. } = conditioned;
     let projection = &weighed.base;
     let entry = &weighed.entries[k];
     let c = &entry.candidate;
@@ -121,8 +121,8 @@ fn of_entry(room: &Room, k: usize, top: Option<&Judged>) -> CandidateReport {
 }
 
 /// Other entries whose signatures are that of an entry as it was fitted.
-fn alike(room: &Room, k: usize, config: &DiagnosisConfig) -> Vec<String> {
-    let Room { problem, weighed, .. } = room;
+fn alike(conditioned: &ConditionedProblem, k: usize, config: &DiagnosisConfig) -> Vec<String> {
+    let ConditionedProblem { problem, weighed, .. } = conditioned;
     let entry = &weighed.entries[k];
     let projection = &weighed.base;
     // What these motions do not show at any size looks like everything and like nothing.

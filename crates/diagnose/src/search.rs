@@ -1,12 +1,12 @@
 //! The whole search: from nothing or from names that were proposed, then beside the unlisted shapes that may hide effects.
 
 use crate::DiagnoseError;
+use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems, as_candidate};
 use crate::config::DiagnosisConfig;
 use crate::curves::{Curve, error_curves};
 use crate::fewer::fewer;
 use crate::forward::{Accepted, Step, confirm, forward, known, named};
 use crate::problem::Candidate;
-use crate::rooms::{Room, Rooms, as_candidate};
 use std::rc::Rc;
 
 /// Where the search ended.
@@ -19,9 +19,9 @@ pub(crate) struct Search {
     /// Error curves of joints over their own angle that no name explains, the strongest first.
     pub curves: Vec<Curve>,
     /// What remains with the named ones in the model.
-    pub rest: Rc<Room>,
+    pub rest: Rc<ConditionedProblem>,
     /// What remains with the curves in it too.
-    pub with_curves: Rc<Room>,
+    pub with_curves: Rc<ConditionedProblem>,
     /// Whether anything remains that these data show.
     pub left_over: bool,
     /// Whether what remains is so small a part of the first effect that it may be that effect's shape.
@@ -39,107 +39,110 @@ pub(crate) struct Found {
 /// Searches; then once more with the unlisted shapes in the model, for effects they may hide. It begins with names that were
 /// `proposed` where each of them stands here too.
 pub(crate) fn search(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     proposed: &[Candidate],
     config: &DiagnosisConfig,
 ) -> Result<Search, DiagnoseError> {
-    let Found { mut accepted, may_be_shape } = match beyond(rooms, proposed, config)? {
-        Some(found) => fewer(rooms, found, config)?,
-        None => from_nothing(rooms, config)?,
+    let Found { mut accepted, may_be_shape } = match beyond(conditioned_problems, proposed, config)? {
+        Some(found) => fewer(conditioned_problems, found, config)?,
+        None => from_nothing(conditioned_problems, config)?,
     };
     let mut names = named(&accepted);
-    let mut rest = rooms.with(&names)?;
+    let mut rest = conditioned_problems.with(&names)?;
     let left_over = something(&rest, config);
     let (mut tentative, mut curves) = (Vec::new(), Vec::new());
     if left_over && !may_be_shape {
-        curves = error_curves(rooms, &names, config)?;
+        curves = error_curves(conditioned_problems, &names, config)?;
         let mut shapes: Vec<Candidate> = curves.iter().map(|c| c.candidate.clone()).collect();
-        accepted = beside_curves(rooms, accepted, &shapes, &rest, config)?;
+        accepted = beside_curves(conditioned_problems, accepted, &shapes, &rest, config)?;
         names = named(&accepted);
-        rest = rooms.with(&names)?;
+        rest = conditioned_problems.with(&names)?;
         if shapes.is_empty() {
             let best = rest.weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats);
             shapes.extend(best.map(|cell| as_candidate(&cell.what, &rest, config)));
         }
         if !shapes.is_empty() {
-            let (steps, _) = forward(rooms, known(&names, &rest), &shapes, config)?;
+            let (steps, _) = forward(conditioned_problems, known(&names, &rest), &shapes, config)?;
             if steps.len() > names.len() {
-                tentative = confirm(rooms, steps, &shapes, config)?;
+                tentative = confirm(conditioned_problems, steps, &shapes, config)?;
                 tentative.retain(|t| names.iter().all(|n| n.spec != t.candidate.spec));
             }
         }
     }
     let all: Vec<Candidate> =
         names.iter().cloned().chain(curves.iter().map(|c| c.candidate.clone())).collect();
-    let with_curves = rooms.with(&all)?;
+    let with_curves = conditioned_problems.with(&all)?;
     let may_be_shape = left_over && may_be_shape;
     Ok(Search { accepted, tentative, curves, rest, with_curves, left_over, may_be_shape })
 }
 
 /// The names that a search finds which begins with none.
-pub(crate) fn from_nothing(rooms: &mut Rooms<'_>, config: &DiagnosisConfig) -> Result<Found, DiagnoseError> {
-    let (steps, may_be_shape) = forward(rooms, Vec::new(), &[], config)?;
-    let accepted = confirm(rooms, steps, &[], config)?;
-    fewer(rooms, Found { accepted, may_be_shape }, config)
+pub(crate) fn from_nothing(
+    conditioned_problems: &mut ConditionedProblems<'_>,
+    config: &DiagnosisConfig,
+) -> Result<Found, DiagnoseError> {
+    let (steps, may_be_shape) = forward(conditioned_problems, Vec::new(), &[], config)?;
+    let accepted = confirm(conditioned_problems, steps, &[], config)?;
+    fewer(conditioned_problems, Found { accepted, may_be_shape }, config)
 }
 
 /// The same from names that fewer dwells proposed. None where not all of them are confirmed here, each as the best there is
 /// beside the others: then the steps that led to them would be others.
 fn beyond(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     proposed: &[Candidate],
     config: &DiagnosisConfig,
 ) -> Result<Option<Found>, DiagnoseError> {
     if proposed.is_empty() {
         return Ok(None);
     }
-    let found = going_on(rooms, proposed, config)?;
+    let found = going_on(conditioned_problems, proposed, config)?;
     Ok(found.filter(|found| found.accepted.iter().all(|a| a.leads(config))))
 }
 
 /// The names of which these are the first: confirmed, then what they leave. None where not all of them are confirmed.
 pub(crate) fn going_on(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     names: &[Candidate],
     config: &DiagnosisConfig,
 ) -> Result<Option<Found>, DiagnoseError> {
     let steps = names.iter().map(|c| Step::known(c.clone(), f64::INFINITY)).collect();
-    let accepted = confirm(rooms, steps, &[], config)?;
+    let accepted = confirm(conditioned_problems, steps, &[], config)?;
     if accepted.len() < names.len() {
         return Ok(None);
     }
     let known = accepted.iter().map(|a| Step::known(a.candidate.clone(), a.fall())).collect();
-    let (steps, may_be_shape) = forward(rooms, known, &[], config)?;
+    let (steps, may_be_shape) = forward(conditioned_problems, known, &[], config)?;
     let same = steps.iter().map(|s| &s.candidate.spec).eq(accepted.iter().map(|a| &a.candidate.spec));
-    let accepted = if same { accepted } else { confirm(rooms, steps, &[], config)? };
+    let accepted = if same { accepted } else { confirm(conditioned_problems, steps, &[], config)? };
     Ok((accepted.len() >= names.len()).then_some(Found { accepted, may_be_shape }))
 }
 
 /// The names that stand beside error curves too: what a curve of a joint's own angle explains as well was never that effect.
 fn beside_curves(
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     accepted: Vec<Accepted>,
     curves: &[Candidate],
-    rest: &Room,
+    rest: &ConditionedProblem,
     config: &DiagnosisConfig,
 ) -> Result<Vec<Accepted>, DiagnoseError> {
     if curves.is_empty() {
         return Ok(accepted);
     }
-    let kept = confirm(rooms, known(&named(&accepted), rest), curves, config)?;
+    let kept = confirm(conditioned_problems, known(&named(&accepted), rest), curves, config)?;
     if kept.len() == accepted.len() {
         return Ok(accepted);
     }
     let mut steps = named(&accepted);
     steps.retain(|c| kept.iter().any(|k| k.candidate.spec == c.spec));
-    confirm(rooms, known(&steps, rest), &[], config)
+    confirm(conditioned_problems, known(&steps, rest), &[], config)
 }
 
 /// Whether something without a name is missing: improbable as nothing, and a shape that is not listed says more of dwells that the
 /// fit did not see.
-pub(crate) fn something(room: &Room, config: &DiagnosisConfig) -> bool {
-    room.weighed.p_nothing < config.max_probability_nothing
-        && room.best_unlisted(config).is_some_and(|(best, _)| room.predicts(best, config))
+pub(crate) fn something(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> bool {
+    conditioned.weighed.p_nothing < config.max_probability_nothing
+        && conditioned.best_unlisted(config).is_some_and(|(best, _)| conditioned.predicts(best, config))
 }
 
 #[cfg(test)]

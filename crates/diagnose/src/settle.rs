@@ -5,12 +5,12 @@
 //! within a standard error of what says most.
 
 use crate::DiagnoseError;
+use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
 use crate::costs::Costs;
 use crate::forward::{Accepted, all_but, confirm, known, named};
 use crate::judge::Grade;
 use crate::problem::Candidate;
-use crate::rooms::{Room, Rooms};
 use crate::score::{Score, weights};
 use crate::search::{Search, something};
 
@@ -49,16 +49,17 @@ pub(crate) struct Scored {
 /// Settles the names of what was found.
 pub(crate) fn settle(
     search: &mut Search,
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     config: &DiagnosisConfig,
 ) -> Result<(), DiagnoseError> {
     let begun = specs(&search.accepted);
-    names_settled(search, rooms, config)?;
+    names_settled(search, conditioned_problems, config)?;
     if specs(&search.accepted) != begun {
         let names = named(&search.accepted);
         let curves = search.curves.iter().map(|c| c.candidate.clone());
-        search.with_curves = rooms.with(&names.iter().cloned().chain(curves).collect::<Vec<_>>())?;
-        search.rest = rooms.with(&names)?;
+        search.with_curves =
+            conditioned_problems.with(&names.iter().cloned().chain(curves).collect::<Vec<_>>())?;
+        search.rest = conditioned_problems.with(&names)?;
         search.left_over = something(&search.rest, config);
     }
     Ok(())
@@ -66,19 +67,25 @@ pub(crate) fn settle(
 
 fn names_settled(
     search: &mut Search,
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     config: &DiagnosisConfig,
 ) -> Result<(), DiagnoseError> {
     let curves: Vec<Candidate> = search.curves.iter().map(|c| c.candidate.clone()).collect();
     let beside = |all: &[Accepted], i: usize| [all_but(&named(all), i), curves.clone()].concat();
     let all = search.tentative.iter().enumerate();
-    let tentative = all.filter_map(|(i, a)| settled(a, &beside(&search.tentative, i), rooms, config));
+    let tentative =
+        all.filter_map(|(i, a)| settled(a, &beside(&search.tentative, i), conditioned_problems, config));
     search.tentative = tentative.collect();
     for round in 1..=ROUNDS {
         let before = specs(&search.accepted);
         let mut settled_all = Vec::new();
         for i in 0..search.accepted.len() {
-            settled_all.push(settled(&search.accepted[i], &beside(&search.accepted, i), rooms, config));
+            settled_all.push(settled(
+                &search.accepted[i],
+                &beside(&search.accepted, i),
+                conditioned_problems,
+                config,
+            ));
         }
         let fallen = settled_all.iter().any(Option::is_none);
         search.accepted = settled_all.into_iter().flatten().collect();
@@ -88,7 +95,7 @@ fn names_settled(
         }
         // Beside another name one of them may be needed no longer.
         let steps = known(&named(&search.accepted), &search.rest);
-        search.accepted = confirm(rooms, steps, &curves, config)?;
+        search.accepted = confirm(conditioned_problems, steps, &curves, config)?;
     }
     Ok(())
 }
@@ -101,22 +108,23 @@ fn specs(accepted: &[Accepted]) -> Vec<String> {
 fn settled(
     found: &Accepted,
     others: &[Candidate],
-    rooms: &mut Rooms<'_>,
+    conditioned_problems: &mut ConditionedProblems<'_>,
     config: &DiagnosisConfig,
 ) -> Option<Accepted> {
-    let room = found.room.clone();
-    let with = |k: usize| [others, std::slice::from_ref(&room.weighed.entries[k].candidate)].concat();
+    let conditioned = found.conditioned.clone();
+    let with = |k: usize| [others, std::slice::from_ref(&conditioned.weighed.entries[k].candidate)].concat();
     let mut refits: Vec<(usize, Score)> = Vec::new();
-    for k in near(found, &room, config) {
-        refits.extend(rooms.score(&with(k), &room).map(|score| (k, score)));
+    for k in near(found, &conditioned, config) {
+        refits.extend(conditioned_problems.score(&with(k), &conditioned).map(|score| (k, score)));
     }
-    let nothing = rooms.score(others, &room).unwrap_or_else(|| room.nothing().clone());
-    let refits = one_of_each_cause(refits, &room, config);
-    let (set, instead_of) = answer(found, &refits, &nothing, &room, config);
+    let nothing =
+        conditioned_problems.score(others, &conditioned).unwrap_or_else(|| conditioned.nothing().clone());
+    let refits = one_of_each_cause(refits, &conditioned, config);
+    let (set, instead_of) = answer(found, &refits, &nothing, &conditioned, config);
     let (mut judged, mut grade) = (found.judged.clone(), found.grade);
     let first = *set.first()?;
     if first != judged.entry {
-        judged = room.judge(first, config);
+        judged = conditioned.judge(first, config);
         grade = judged.grade(config).max(Grade::OrUnlisted);
     }
     // One step, far from where the fit ends, may promise what no refit keeps.
@@ -128,15 +136,15 @@ fn settled(
     }
     // Of the shape of the name it is no other answer.
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
-    let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &room, config);
-    let candidate = room.weighed.entries[judged.entry].candidate.clone();
-    let settled = Accepted { candidate, judged, room, grade, set, instead_of, ranked };
+    let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &conditioned, config);
+    let candidate = conditioned.weighed.entries[judged.entry].candidate.clone();
+    let settled = Accepted { candidate, judged, conditioned, grade, set, instead_of, ranked };
     (settled.probability(|what| what == Instead::Nothing) <= 0.5).then_some(settled)
 }
 
 /// The entry, and those that one step puts near the best, each name once; a group that holds another one is no other name for it.
-fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
-    let weighed = &room.weighed;
+fn near(found: &Accepted, conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Vec<usize> {
+    let weighed = &conditioned.weighed;
     let own = found.judged.entry;
     let mut names = vec![own];
     for k in weighed.ranking() {
@@ -147,7 +155,8 @@ fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
         names.extend((new && names.len() < ALTERNATIVES).then_some(k));
     }
     // Its own may be that of a refit.
-    let one_step = |k: &usize| (*k, if *k == own { found.judged.score.clone() } else { room.score_of(*k) });
+    let one_step =
+        |k: &usize| (*k, if *k == own { found.judged.score.clone() } else { conditioned.score_of(*k) });
     let mut scored: Vec<(usize, Score)> = names.iter().map(one_step).collect();
     scored.sort_by(|a, b| 0f64.total_cmp(&a.1.above(&b.1).nats));
     let gain = found.judged.gain.nats;
@@ -164,14 +173,14 @@ fn near(found: &Accepted, room: &Room, config: &DiagnosisConfig) -> Vec<usize> {
 /// Those that are worth most first; of the moments, and shapes, of one cause the best stands for all.
 fn one_of_each_cause(
     mut refits: Vec<(usize, Score)>,
-    room: &Room,
+    conditioned: &ConditionedProblem,
     config: &DiagnosisConfig,
 ) -> Vec<(usize, Score)> {
-    let worth = |(k, score): &(usize, Score)| score.worth(room.costs(config).of_entry(*k));
+    let worth = |(k, score): &(usize, Score)| score.worth(conditioned.costs(config).of_entry(*k));
     refits.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
     let mut causes: Vec<usize> = Vec::new();
     refits.retain(|(k, _)| {
-        let new = causes.iter().all(|known| !room.weighed.one_cause(*known, *k));
+        let new = causes.iter().all(|known| !conditioned.weighed.one_cause(*known, *k));
         causes.extend(new.then_some(*k));
         new
     });
@@ -183,19 +192,19 @@ fn answer(
     found: &Accepted,
     refits: &[(usize, Score)],
     nothing: &Score,
-    room: &Room,
+    conditioned: &ConditionedProblem,
     config: &DiagnosisConfig,
 ) -> (Vec<usize>, Vec<String>) {
-    let of = |k: usize| &room.weighed.entries[k].candidate;
+    let of = |k: usize| &conditioned.weighed.entries[k].candidate;
     let best = refits.iter().map(|(_, score)| score.above(nothing).nats).fold(0.0, f64::max);
     let detail = config.leftover_share * best;
-    let costs = room.costs(config);
+    let costs = conditioned.costs(config);
     let stands = |(k, score): &&(usize, Score)| {
         // What has more freedom must say more by what that costs, too.
         let freedom = |other: usize| (costs.of_entry(other) - costs.of_entry(*k)).max(0.0);
         let beats = |(l, other): &(usize, Score)| other.above(score).less(freedom(*l)).is_clear(detail);
         let beaten = refits.iter().any(beats);
-        let real = *k == found.judged.entry || room.judge(*k, config).grade(config) > Grade::Refused;
+        let real = *k == found.judged.entry || conditioned.judge(*k, config).grade(config) > Grade::Refused;
         !beaten && real && score.above(nothing).nats >= config.margin_nats
     };
     let set = simplest_first(refits.iter().filter(stands).collect(), costs);
@@ -223,10 +232,10 @@ fn weighed(
     refits: Vec<(usize, Score)>,
     nothing: Score,
     unlisted: Option<Score>,
-    room: &Room,
+    conditioned: &ConditionedProblem,
     config: &DiagnosisConfig,
 ) -> Vec<Scored> {
-    let costs = room.costs(config);
+    let costs = conditioned.costs(config);
     let entries = refits.into_iter().map(|(k, score)| (Instead::Entry(k), score));
     let others = std::iter::once((Instead::Nothing, nothing));
     let all: Vec<(Instead, Score)> =

@@ -8,8 +8,8 @@ mod costs;
 mod markers;
 
 use crate::cells::Unlisted;
+use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::projection::Projection;
-use crate::rooms::{Room, Rooms};
 use crate::weigh::{Outside, Weighed, weigh};
 use crate::{Correlation, DiagnosisConfig, LinearRefit, Problem, Scatter};
 use arm::{design, problem, rng};
@@ -66,15 +66,19 @@ pub(crate) fn quick() -> DiagnosisConfig {
 pub(crate) use arm::planted;
 
 /// Calls `ask` with the rooms of a problem.
-pub(crate) fn in_rooms<T>(p: &Problem, config: &DiagnosisConfig, ask: impl FnOnce(&mut Rooms<'_>) -> T) -> T {
+pub(crate) fn with_conditioned<T>(
+    p: &Problem,
+    config: &DiagnosisConfig,
+    ask: impl FnOnce(&mut ConditionedProblems<'_>) -> T,
+) -> T {
     let mut refit = LinearRefit::new(p.clone());
     let first = (p.clone(), weigh(p, config));
-    ask(&mut Rooms::new(&mut refit, vec![true; p.dwells.len()], first, config))
+    ask(&mut ConditionedProblems::new(&mut refit, vec![true; p.dwells.len()], first, config))
 }
 
 /// The first of them.
-pub(crate) fn room(p: &Problem, config: &DiagnosisConfig) -> std::rc::Rc<Room> {
-    in_rooms(p, config, |rooms| rooms.with(&[]).unwrap())
+pub(crate) fn conditioned(p: &Problem, config: &DiagnosisConfig) -> std::rc::Rc<ConditionedProblem> {
+    with_conditioned(p, config, |conditioned_problems| conditioned_problems.with(&[]).unwrap())
 }
 
 /// Where a candidate was weighed.

@@ -1,6 +1,7 @@
 //! What to say about structure no listed effect explains: where, on what, what shape, and a formula to paste.
 
 use crate::cells::Unlisted;
+use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Series, ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind, range};
@@ -9,7 +10,6 @@ use crate::expression::{expression, to_digits};
 use crate::forward::leading;
 use crate::problem::{Channel, Problem};
 use crate::ripple::{Peak, beside_slow, peak};
-use crate::rooms::Room;
 use crate::score::weights;
 use crate::weigh::Outside;
 use armcal_core::Unit;
@@ -25,27 +25,34 @@ const FEWEST_POINTS: usize = 41;
 const POINTS_A_FUNCTION: usize = 4;
 
 /// Describes the best unlisted explanation of a weighed problem.
-pub(crate) fn unknown_report(room: &Room, config: &DiagnosisConfig) -> Option<UnknownReport> {
-    let weighed = &room.weighed;
+pub(crate) fn unknown_report(
+    conditioned: &ConditionedProblem,
+    config: &DiagnosisConfig,
+) -> Option<UnknownReport> {
+    let weighed = &conditioned.weighed;
     // A discrepancy that beats every cell knows the driver better than any cell; a cell also knows where.
-    described(room, weighed.best_cell().or_else(|| weighed.best_unlisted())?, config)
+    described(conditioned, weighed.best_cell().or_else(|| weighed.best_unlisted())?, config)
 }
 
 /// Describes one unlisted explanation.
-pub(crate) fn described(room: &Room, outside: &Outside, config: &DiagnosisConfig) -> Option<UnknownReport> {
-    let Room { problem, weighed, .. } = room;
+pub(crate) fn described(
+    conditioned: &ConditionedProblem,
+    outside: &Outside,
+    config: &DiagnosisConfig,
+) -> Option<UnknownReport> {
+    let ConditionedProblem { problem, weighed, .. } = conditioned;
     let (best, ln) = (&outside.what, outside.ln_evidence);
     let gram = weighed.base.gram(&weighed.dense(&best.columns, problem));
     let a = best_amplitude(&gram, &weighed.base, config);
     let (theta, covariance) = coefficients(&gram, a);
     let drop = theta.dot(&gram.g);
     let variance = weighed.base.variance_without(drop);
-    let effect = weighed.tamed(&best.columns, problem, config);
-    let places = weighed.gain(problem, &effect, &room.exam().folds, config);
-    let score = room.score_with(&effect);
-    let listed = leading(room, config).into_iter().next();
-    let costs = room.costs(config);
-    let mut all = vec![(&score, costs.of_unlisted()), (room.nothing(), costs.of_nothing())];
+    let effect = weighed.regularised(&best.columns, problem, config);
+    let places = weighed.gain(problem, &effect, &conditioned.exam().folds, config);
+    let score = conditioned.score_with(&effect);
+    let listed = leading(conditioned, config).into_iter().next();
+    let costs = conditioned.costs(config);
+    let mut all = vec![(&score, costs.of_unlisted()), (conditioned.nothing(), costs.of_nothing())];
     all.extend(listed.iter().map(|(k, score)| (score, costs.of_entry(*k))));
     let channel = best.channel.and_then(|c| problem.channels.get(c));
     let driver = best.driver.and_then(|d| weighed.dependences.drivers.get(d));
@@ -91,7 +98,7 @@ pub(crate) fn described(room: &Room, outside: &Outside, config: &DiagnosisConfig
         channel: channel.map_or("displacement", |c| c.name.as_str()).to_string(),
         driver: best.driver_name.clone(),
         probability: weights(&all, config)[0],
-        gain_nats: score.above(room.nothing()).nats,
+        gain_nats: score.above(conditioned.nothing()).nats,
         unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
         shape,
         ripple: strongest.filter(Peak::is_alone).map(|p| p.ripple),

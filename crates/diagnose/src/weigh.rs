@@ -261,7 +261,12 @@ impl Weighed {
     }
 
     /// The same for left-out fits, which are made in units of the declared noise.
-    pub fn tamed(&self, columns: &Columns, problem: &Problem, config: &DiagnosisConfig) -> DMatrix<f64> {
+    pub fn regularised(
+        &self,
+        columns: &Columns,
+        problem: &Problem,
+        config: &DiagnosisConfig,
+    ) -> DMatrix<f64> {
         self.sized(columns, problem, config) / self.scale
     }
 

@@ -1,6 +1,6 @@
 //! From which side each joint came to rest.
 
-use crate::past::Past;
+use crate::motion_history::Past;
 use armcal_core::Arrival;
 use std::ops::Range;
 

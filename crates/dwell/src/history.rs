@@ -3,7 +3,7 @@
 use crate::DwellConfig;
 use crate::arrival::arrival;
 use crate::memory::path_memory;
-use crate::past::Past;
+use crate::motion_history::Past;
 use crate::pauses::Encoders;
 use armcal_core::Arrival;
 

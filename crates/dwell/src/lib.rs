@@ -3,7 +3,7 @@
 //! ```text
 //! joints, tip --align_clocks--> ClockAlignment --detect_dwells--> [Dwell] (mean, spread, standard error,
 //!                                                                          arrival direction, tip, n_eff)
-//! joints, tip, dwells --track------> [Moment] (the moving tip, with the joints at that moment)
+//! joints, tip, dwells --track------> [TrackSample] (the moving tip, with the joints at that moment)
 //! table, base --mean_pose-----> MeanPose (with a warning when the body moved)
 //! ```
 //!
@@ -18,7 +18,7 @@ mod detect;
 mod error;
 mod history;
 mod memory;
-mod past;
+mod motion_history;
 mod pauses;
 mod series;
 mod static_pose;
@@ -35,4 +35,4 @@ pub use config::{ClockConfig, DwellConfig, KnownClock};
 pub use detect::detect_dwells;
 pub use error::DwellError;
 pub use static_pose::{MeanPose, mean_pose};
-pub use track::{Moment, track};
+pub use track::{TrackSample, track};

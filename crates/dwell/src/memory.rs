@@ -1,6 +1,6 @@
 //! What a joint's path leaves behind at rest: the turning points that a gap in the gear remembers.
 
-use crate::past::Past;
+use crate::motion_history::Past;
 use std::ops::Range;
 
 /// Path further back than this is not kept [rad]: no credible lost motion reaches it.

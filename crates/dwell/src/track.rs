@@ -16,7 +16,7 @@ const VELOCITY_HALF_S: f64 = 0.02;
 
 /// One frame of the sensor while the arm moved.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Moment {
+pub struct TrackSample {
     /// Time on the robot's clock [ns].
     pub time_ns: i64,
     /// Which motion it belongs to, from 0: a dwell or a break of the stream ends one.
@@ -51,7 +51,7 @@ pub fn track(
     clock: Option<&ClockAlignment>,
     dwells: &[Dwell],
     config: &DwellConfig,
-) -> Result<Vec<Moment>, DwellError> {
+) -> Result<Vec<TrackSample>, DwellError> {
     config.check()?;
     check_joints(&samples.joints, DOING)?;
     let Some(tip) = samples.tip.as_ref().filter(|t| !t.is_empty()) else { return Ok(Vec::new()) };
@@ -71,7 +71,7 @@ pub fn track(
     let moment = |(row, motion, reading): (usize, usize, Reading)| {
         let time_ns = tip.robot_ns[row];
         let joint_rad = reading.joint_rad(&samples.joints);
-        Moment {
+        TrackSample {
             time_ns,
             motion,
             joint_velocity_radps: velocities_radps(&encoders, time_ns, joint_rad.len()),

@@ -12,7 +12,7 @@ pub enum HeldOutError {
     Run(#[from] RunError),
     /// Reading back the result.
     #[error(transparent)]
-    PastRun(#[from] armcal_result::PastRunError),
+    StoredRun(#[from] armcal_result::StoredResultError),
     /// A result that cannot be used here.
     #[error("{} {problem}", path.display())]
     Result { path: PathBuf, problem: String },

@@ -7,7 +7,7 @@
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod error;
-mod past;
+mod stored;
 mod transfer;
 mod verify;
 

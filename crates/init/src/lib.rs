@@ -33,7 +33,7 @@ pub use roles::{Cast, Role};
 use armcal_calibrate::HoldoutConfig;
 use armcal_recording::input::Kind;
 use armcal_stages::associated::Associated;
-use armcal_stages::perceive;
+use armcal_stages::preprocess;
 use armcal_stages::{Inputs, Silent, Steps};
 use armcal_table::Board;
 use channels::Channels;
@@ -185,8 +185,8 @@ fn size_sockets(known: &mut Known<'_>) -> Result<(), InitError> {
         Some(deviation) => chain.with_deviation(deviation, &known.arm.file)?,
         None => chain,
     };
-    let recordings = perceive::open_all(&pipeline, &Silent)?;
-    let seen = perceive::dwells_of_all(&pipeline, &chain, &recordings, &Silent, &mut drop)?;
+    let recordings = preprocess::open_all(&pipeline, &Silent)?;
+    let seen = preprocess::dwells_of_all(&pipeline, &chain, &recordings, &Silent, &mut drop)?;
     if let Some(sockets) = &mut known.sockets {
         let board = Some(sockets.board.clone());
         let (changes, most_rounds, known) = (Vec::new(), 2, Associated::default());

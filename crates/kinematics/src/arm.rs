@@ -4,15 +4,15 @@ use crate::KinematicsError;
 use crate::motion::Motion;
 use armcal_compensate::{Drive, TargetFrame};
 use armcal_core::{FeatureId, Unit};
-use armcal_model_file::{PastArms, PastModel};
+use armcal_model_file::{StoredArms, StoredModel};
 
 /// A calibrated arm with its effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibratedArm {
     /// What the file says.
-    pub file: PastModel,
+    pub file: StoredModel,
     /// The models that it is about.
-    pub models: PastArms,
+    pub models: StoredArms,
 }
 
 /// Under which conditions the arm is driven.
@@ -36,7 +36,7 @@ impl CalibratedArm {
     /// # Errors
     /// A text that is none, or whose parts contradict each other.
     pub fn from_json(text: &str) -> Result<CalibratedArm, KinematicsError> {
-        let file = PastModel::from_json(text)?;
+        let file = StoredModel::from_json(text)?;
         let models = file.arms()?;
         let arm = CalibratedArm { file, models };
         Motion::of(&arm, &Conditions::default())?;

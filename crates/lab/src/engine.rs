@@ -8,7 +8,7 @@ use crate::LabError;
 use crate::arm::AxisArm;
 use crate::config::LabConfig;
 use crate::hand::Tremor;
-use crate::mechanism::{Body, Mechanism, Moment};
+use crate::mechanism::{Body, Mechanism, RigState};
 use crate::random::{Purpose, Stream};
 use crate::rig::{BoardPlace, Rig};
 use crate::servo::{Servo, counted};
@@ -208,9 +208,9 @@ impl<'a> Engine<'a> {
         self.link_rad = link;
     }
 
-    fn moment(&self) -> Moment<'_> {
+    fn moment(&self) -> RigState<'_> {
         let session_s = self.session_s();
-        Moment {
+        RigState {
             time_s: self.time_s,
             session_s,
             recording: self.recording,

@@ -46,7 +46,7 @@ pub mod truth;
 
 pub use config::LabConfig;
 pub use error::LabError;
-pub use mechanism::{Body, Mechanism, MechanismFactory, Moment, Named, nothing_hidden};
+pub use mechanism::{Body, Mechanism, MechanismFactory, Named, RigState, nothing_hidden};
 pub use quick::{Nominal, NominalBoard, Observed, observe, observe_from};
 pub use trace::RestKind;
 pub use truth::{DwellTruth, RecordingTruth, SetPointTruth, Truth};

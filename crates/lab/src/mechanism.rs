@@ -18,7 +18,7 @@ use armcal_core::Pose;
 
 /// What a mechanism can know about the present moment.
 #[derive(Debug, Clone, Copy)]
-pub struct Moment<'a> {
+pub struct RigState<'a> {
     /// Time since the start of the recording [s].
     pub time_s: f64,
     /// Time since the start of the session [s].
@@ -66,39 +66,39 @@ pub trait Named {
 pub trait Mechanism: Named + std::fmt::Debug + Send {
     /// The joint, from 1, whose link it puts ahead of the motor while all joints are at these angles, and by how much [rad]:
     /// all that both turning hooks do where it does not matter which side drives.
-    fn ahead(&mut self, _now: &Moment<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
+    fn ahead(&mut self, _now: &RigState<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
         None
     }
 
     /// The motor drives: turns motor-side angles into link-side angles, in place.
-    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn motor_to_link(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         if let Some((joint, by_rad)) = self.ahead(now, joint_rad) {
             joint_rad[joint - 1] += by_rad;
         }
     }
 
-    /// The hand drives: turns link-side angles into motor-side angles, in place. With [`Moment::motors_lead`] it is
+    /// The hand drives: turns link-side angles into motor-side angles, in place. With [`RigState::motors_lead`] it is
     /// the motors that take the links there.
-    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn link_to_motor(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         if let Some((joint, by_rad)) = self.ahead(now, joint_rad) {
             joint_rad[joint - 1] -= by_rad;
         }
     }
 
     /// Changes the arm's geometry.
-    fn reshape_arm(&self, _now: &Moment<'_>, _arm: &mut AxisArm) {}
+    fn reshape_arm(&self, _now: &RigState<'_>, _arm: &mut AxisArm) {}
 
     /// Moves the base in the world.
-    fn move_base(&self, _now: &Moment<'_>, _world_from_base: &mut Pose) {}
+    fn move_base(&self, _now: &RigState<'_>, _world_from_base: &mut Pose) {}
 
     /// Moves the board in the world.
-    fn move_board(&self, _now: &Moment<'_>, _world_from_board: &mut Pose) {}
+    fn move_board(&self, _now: &RigState<'_>, _world_from_board: &mut Pose) {}
 
     /// Changes what the encoders read [rad, motor side].
-    fn distort_encoder(&self, _now: &Moment<'_>, _reading_rad: &mut [f64]) {}
+    fn distort_encoder(&self, _now: &RigState<'_>, _reading_rad: &mut [f64]) {}
 
     /// Changes what the cameras make of the true pose of a body in the world.
-    fn distort_camera(&self, _now: &Moment<'_>, _body: Body, _world_from_body: &mut Pose) {}
+    fn distort_camera(&self, _now: &RigState<'_>, _body: Body, _world_from_body: &mut Pose) {}
 }
 
 /// Makes the mechanisms of one recording, given its index. They all start in their initial state.

@@ -4,8 +4,8 @@
 //! and the nominal arm a model starts from. Movements are followed at a few positions each, so hysteresis is in
 //! the state it would be in; noise is that of the mean over a dwell.
 
+mod motion_history;
 mod nominal;
-mod past;
 mod reading;
 
 pub use nominal::{Nominal, NominalBoard};
@@ -121,10 +121,14 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
             feature: FeatureId::TIP,
             dwell: DwellId { recording, dwell },
             time_ns: config.start_ns(recording) + (mid_s * 1e9).round() as i64,
-            arrival: past::arrivals(since, &joint_rad, config.joints.count_rad()),
-            path_memory_rad: Some(past::memories(since, &joint_rad, config.joints.count_rad())),
-            pair_memory_rad: Some(past::pair_memories(since, &joint_rad, config.joints.count_rad())),
-            moved_rad: observations.last().map(|before| past::moved(&before.joint_rad, &joint_rad)),
+            arrival: motion_history::arrivals(since, &joint_rad, config.joints.count_rad()),
+            path_memory_rad: Some(motion_history::memories(since, &joint_rad, config.joints.count_rad())),
+            pair_memory_rad: Some(motion_history::pair_memories(
+                since,
+                &joint_rad,
+                config.joints.count_rad(),
+            )),
+            moved_rad: observations.last().map(|before| motion_history::moved(&before.joint_rad, &joint_rad)),
             joint_velocity_radps: None,
             joint_rad,
             joint_sigma_rad,

@@ -268,7 +268,7 @@ impl Named for Play {
 }
 
 impl Mechanism for Play {
-    fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn motor_to_link(&mut self, _now: &RigState<'_>, joint_rad: &mut [f64]) {
         let half = self.width_rad / 2.0;
         let motor = joint_rad[1];
         let link = self.link_rad.unwrap_or(motor).clamp(motor - half, motor + half);
@@ -276,7 +276,7 @@ impl Mechanism for Play {
         joint_rad[1] = link;
     }
 
-    fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn link_to_motor(&mut self, _now: &RigState<'_>, joint_rad: &mut [f64]) {
         let half = self.width_rad / 2.0;
         let link = joint_rad[1];
         let motor = self.motor_rad.unwrap_or(link).clamp(link - half, link + half);

@@ -1,6 +1,6 @@
 //! `model.json`: the calibrated model with all it needs to predict again, without the recordings it came from.
 //!
-//! [`PastModel::from_json`] reads it, [`PastModel::arms`] makes the models to compute with. The nominal arm is kept as the
+//! [`StoredModel::from_json`] reads it, [`StoredModel::arms`] makes the models to compute with. The nominal arm is kept as the
 //! text of its file, frames and effects as what was built on it, what drives the effects as the facts of the session; so
 //! the model is made again by the code that made it first.
 
@@ -35,7 +35,7 @@ pub enum FileError {
 
 /// A calibrated model of an earlier run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PastModel {
+pub struct StoredModel {
     /// [`SCHEMA`].
     pub schema: String,
     /// The version of armcal that wrote it.
@@ -122,7 +122,7 @@ pub struct RecordingFacts {
 
 /// The model without effects and with them, and their parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PastArms {
+pub struct StoredArms {
     /// The nominal arm in its frames: no effects.
     pub geometry: Model,
     /// Its parameters: robot nominal, estimated frames fitted.
@@ -133,7 +133,7 @@ pub struct PastArms {
     pub values: Vec<f64>,
 }
 
-impl PastModel {
+impl StoredModel {
     /// Its JSON.
     ///
     /// # Errors
@@ -146,8 +146,8 @@ impl PastModel {
     ///
     /// # Errors
     /// A text that is no model in this format.
-    pub fn from_json(text: &str) -> Result<PastModel, FileError> {
-        let model: PastModel = serde_json::from_str(text)?;
+    pub fn from_json(text: &str) -> Result<StoredModel, FileError> {
+        let model: StoredModel = serde_json::from_str(text)?;
         if model.schema != SCHEMA {
             return Err(FileError::Schema { found: model.schema });
         }
@@ -206,7 +206,7 @@ impl PastModel {
     ///
     /// # Errors
     /// Contents that contradict each other, as only a file changed by hand has them.
-    pub fn arms(&self) -> Result<PastArms, ModelError> {
+    pub fn arms(&self) -> Result<StoredArms, ModelError> {
         let measured: Vec<&str> = self.markers.iter().map(|marker| marker.link.as_str()).collect();
         let geometry = self.geometry(self.chain.chain(&measured, Path::new(FILE))?)?;
         let joints = geometry.chain().joint_names();
@@ -222,7 +222,7 @@ impl PastModel {
             });
         }
         let nominal = self.parameters.iter().take(geometry.parameters().len()).map(|v| v.nominal);
-        Ok(PastArms {
+        Ok(StoredArms {
             nominal_values: nominal.collect(),
             geometry,
             values: self.parameters.iter().map(|v| v.calibrated).collect(),

@@ -43,8 +43,8 @@ pub use chain::Chain;
 pub use deviation::Deviation;
 pub use dh_toml::DhRow;
 pub use effects::{
-    Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, Lookalikes, Offered, Override,
-    PlacedEffect, Session, Shape, Since, Target, Toggle, Torque, Word, catalogue, effects_toml, find,
+    Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, JointReference, Lookalikes, Offered,
+    Override, PlacedEffect, Session, Shape, Since, Target, Toggle, Torque, catalogue, effects_toml, find,
     is_of_effect, least_dwells, place_and_moment, tables_toml,
 };
 pub use error::ModelError;

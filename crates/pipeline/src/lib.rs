@@ -6,14 +6,14 @@
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod converged;
 mod diagnosed;
 mod pool;
 mod refits;
 mod run;
-mod settled;
 
+pub use converged::{Converged, settle, settle_again};
 pub use diagnosed::chosen_again;
 pub use pool::{PoolError, Pooled, pool};
 pub use refits::add_refits;
 pub use run::{recalibrate, run};
-pub use settled::{Settled, settle, settle_again};

@@ -1,8 +1,8 @@
 //! The main job, top down: recordings -> samples -> dwells -> places -> observations -> fit -> setup -> diagnosis -> run.
 
+use crate::converged::{HOLDOUT_WORSE, holdout_worse, settle};
 use crate::diagnosed::{DIAGNOSIS_FAILED, diagnose_again};
 use crate::refits::add_refits;
-use crate::settled::{HOLDOUT_WORSE, holdout_worse, settle};
 use armcal_calibrate::calibrate;
 use armcal_config::Pipeline;
 use armcal_model::{EffectSpec, Model};

@@ -11,7 +11,7 @@ use crate::{ReportError, summary_json};
 use armcal_config::{InputMessages, OutputConfig};
 use armcal_recording::atomic::AtomicFile;
 use armcal_recording::{Recording, RecordingError, make_folder};
-use armcal_result::levers::Basis;
+use armcal_result::sensitivity::Basis;
 use armcal_result::{
     CONCLUSIONS_FILE, Conclusions, ModelFile, OBSERVATIONS_FILE, RUN, ResultError, Run, SUMMARY,
     model_file_name, model_files, model_of, observations_json, points,
@@ -51,7 +51,7 @@ pub fn write_all(
     let points = points(run)?;
     let models = model_files(run)?;
     let parameters = parameters_toml(run)?;
-    let past_model = model_of(run)?.json().map_err(ReportError::Page)?;
+    let stored_model = model_of(run)?.json().map_err(ReportError::Page)?;
     // Observations of earlier results are where they were read, and a second copy of them would be pooled with them.
     let observations = match run.is_pool() {
         true => (pool_json::FILE, pool_json(run)),
@@ -69,7 +69,7 @@ pub fn write_all(
         (REPORT, &page),
         (SUMMARY, &summary),
         (PARAMETERS, &parameters),
-        (armcal_model_file::FILE, &past_model),
+        (armcal_model_file::FILE, &stored_model),
         (observations.0, &observations.1),
         (LAYOUT, &layouts.current),
         (LAYOUT_LEGACY, &layouts.legacy),
@@ -87,7 +87,7 @@ pub fn write_all(
         Attachment { name: REPORT, media_type: "text/html", text: &page },
         Attachment { name: SUMMARY, media_type: "application/json", text: &summary },
         Attachment { name: PARAMETERS, media_type: "application/toml", text: &parameters },
-        Attachment { name: armcal_model_file::FILE, media_type: "application/json", text: &past_model },
+        Attachment { name: armcal_model_file::FILE, media_type: "application/json", text: &stored_model },
         Attachment { name: LAYOUT, media_type: "application/json", text: &layouts.current },
         Attachment { name: LAYOUT_LEGACY, media_type: "application/json", text: &layouts.legacy },
     ];

@@ -1,8 +1,8 @@
 //! Two results on the same dwells.
 
 use crate::pairing::{Paired, Unpaired, paired};
-use crate::past::{PastResidual, PastRun};
 use crate::proto;
+use crate::stored::{StoredResidual, StoredRun};
 use armcal_calibrate::{Pair, PairedDifference, independent_groups};
 use serde::Serialize;
 
@@ -87,7 +87,7 @@ pub struct Moved {
 
 impl Comparison {
     /// Compares dwell by dwell: the same time of the same recording, whatever it is called in each result.
-    pub fn of(before: &PastRun, after: &PastRun) -> Comparison {
+    pub fn of(before: &StoredRun, after: &StoredRun) -> Comparison {
         let Paired { pairs: matched, unpaired } = paired(before, after);
         let held: Vec<_> = matched.iter().copied().filter(|(b, a)| b.held_out && a.held_out).collect();
         let judged = if held.is_empty() { &matched } else { &held };
@@ -114,7 +114,7 @@ impl Comparison {
     }
 }
 
-fn difference(rows: &[(&PastResidual, &PastResidual)]) -> Option<Difference> {
+fn difference(rows: &[(&StoredResidual, &StoredResidual)]) -> Option<Difference> {
     let dwells: Vec<_> = rows.iter().map(|(_, a)| (a.dwell.to_string(), Some(a.cavity.as_str()))).collect();
     let pairs: Vec<Pair> = rows
         .iter()
@@ -135,7 +135,7 @@ fn difference(rows: &[(&PastResidual, &PastResidual)]) -> Option<Difference> {
     })
 }
 
-fn by_recording(rows: &[(&PastResidual, &PastResidual)]) -> Vec<(String, Difference)> {
+fn by_recording(rows: &[(&StoredResidual, &StoredResidual)]) -> Vec<(String, Difference)> {
     let mut names: Vec<&str> = Vec::new();
     for (_, a) in rows {
         if !names.contains(&a.recording.as_str()) {
@@ -147,7 +147,7 @@ fn by_recording(rows: &[(&PastResidual, &PastResidual)]) -> Vec<(String, Differe
 }
 
 /// The most improved dwells, then the most worsened.
-fn most_changed(rows: &[(&PastResidual, &PastResidual)]) -> Vec<DwellChange> {
+fn most_changed(rows: &[(&StoredResidual, &StoredResidual)]) -> Vec<DwellChange> {
     let mut all: Vec<DwellChange> = rows
         .iter()
         .map(|(b, a)| DwellChange {
@@ -165,7 +165,7 @@ fn most_changed(rows: &[(&PastResidual, &PastResidual)]) -> Vec<DwellChange> {
     all
 }
 
-fn moved(before: &PastRun, after: &PastRun) -> Vec<Moved> {
+fn moved(before: &StoredRun, after: &StoredRun) -> Vec<Moved> {
     let mut moved: Vec<Moved> = after
         .parameters
         .iter()
@@ -189,7 +189,7 @@ fn in_half_widths(b: &proto::Parameter, a: &proto::Parameter) -> f64 {
     if change == 0.0 { 0.0 } else { change / width }
 }
 
-fn only_in(one: &PastRun, other: &PastRun) -> Vec<String> {
-    let has = |run: &PastRun, name: &str| run.parameters.iter().any(|p| p.name == name);
+fn only_in(one: &StoredRun, other: &StoredRun) -> Vec<String> {
+    let has = |run: &StoredRun, name: &str| run.parameters.iter().any(|p| p.name == name);
     one.parameters.iter().filter(|p| !has(other, &p.name)).map(|p| p.name.clone()).collect()
 }

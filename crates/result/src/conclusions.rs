@@ -3,8 +3,8 @@
 
 use crate::called::Called;
 use crate::error::ResultError;
-use crate::past::{PastRunError, attachment, run_file};
 use crate::run::{Run, VERSION};
+use crate::stored::{StoredResultError, attachment, run_file};
 use armcal_calibrate::Calibration;
 use armcal_core::{Observation, SetupReport};
 use armcal_diagnose::{Calibrated, Diagnosis};
@@ -83,7 +83,7 @@ impl Conclusions {
     ///
     /// # Errors
     /// Results that cannot be read.
-    pub fn open(path: &Path) -> Result<Option<Conclusions>, PastRunError> {
+    pub fn open(path: &Path) -> Result<Option<Conclusions>, StoredResultError> {
         let text = attachment(&run_file(path), FILE)?;
         let read = text.and_then(|text| toml::from_str::<Conclusions>(&text).ok());
         Ok(read.filter(|own| own.schema == SCHEMA))

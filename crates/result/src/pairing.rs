@@ -3,7 +3,7 @@
 //! Names and indices say little: two recordings may share a name, and other settings number dwells anew. A recording is the
 //! same where its files hold the same bytes, or, re-encoded or cut, the same dwells; a dwell is the same where its time is.
 
-use crate::past::{PastDwell, PastRecording, PastResidual, PastRun};
+use crate::stored::{StoredDwell, StoredRecording, StoredResidual, StoredRun};
 use crate::{DwellMark, also_in};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -47,15 +47,15 @@ impl fmt::Display for Unpaired {
 /// What two results have in common.
 pub struct Paired<'r> {
     /// Before and after, in the order of the second.
-    pub pairs: Vec<(&'r PastResidual, &'r PastResidual)>,
+    pub pairs: Vec<(&'r StoredResidual, &'r StoredResidual)>,
     /// Everything else.
     pub unpaired: Vec<Unpaired>,
 }
 
 /// Pairs dwells by recording and time, each once.
-pub fn paired<'r>(before: &'r PastRun, after: &'r PastRun) -> Paired<'r> {
+pub fn paired<'r>(before: &'r StoredRun, after: &'r StoredRun) -> Paired<'r> {
     let (one, other) = (Times::of(before), Times::of(after));
-    let same = |b: &PastRecording| after.recordings.iter().map(|a| is_same(a, b)).collect::<Vec<bool>>();
+    let same = |b: &StoredRecording| after.recordings.iter().map(|a| is_same(a, b)).collect::<Vec<bool>>();
     let same: Vec<Vec<bool>> = before.recordings.iter().map(same).collect();
     let is = |b: usize, a: usize| same.get(b).and_then(|same| same.get(a)).is_some_and(|same| *same);
     let mut used = vec![false; before.residuals.len()];
@@ -82,19 +82,19 @@ pub fn paired<'r>(before: &'r PastRun, after: &'r PastRun) -> Paired<'r> {
 const TWICE: &str = "the result has them twice, and they count once";
 
 /// Dwells in the order of time, each with the index of its residual.
-type InTime<'r> = Vec<(&'r PastDwell, usize)>;
+type InTime<'r> = Vec<(&'r StoredDwell, usize)>;
 
 /// The observed dwells of a result by time.
 struct Times<'r> {
     /// Times of the dwell of each residual.
-    dwell_of: Vec<Option<&'r PastDwell>>,
+    dwell_of: Vec<Option<&'r StoredDwell>>,
     /// Residuals of each recording with their dwells, by what was measured, by time.
     by_recording: Vec<BTreeMap<Option<&'r str>, InTime<'r>>>,
 }
 
 impl<'r> Times<'r> {
-    fn of(run: &'r PastRun) -> Times<'r> {
-        let known: BTreeMap<(usize, usize), &PastDwell> = (run.recordings.iter().enumerate())
+    fn of(run: &'r StoredRun) -> Times<'r> {
+        let known: BTreeMap<(usize, usize), &StoredDwell> = (run.recordings.iter().enumerate())
             .flat_map(|(r, recording)| recording.dwells.iter().map(move |d| ((r, d.index), d)))
             .collect();
         let dwell_of: Vec<_> =
@@ -131,19 +131,19 @@ impl<'r> Times<'r> {
 
 /// The dwell whose middle lies in this one, and the middle of this one in it.
 fn at_time<'d, 'r>(
-    observed: &'d [(&'r PastDwell, usize)],
-    dwell: &PastDwell,
-) -> Option<&'d (&'r PastDwell, usize)> {
+    observed: &'d [(&'r StoredDwell, usize)],
+    dwell: &StoredDwell,
+) -> Option<&'d (&'r StoredDwell, usize)> {
     let time_ns = dwell.mark.time_ns;
     let next = observed.partition_point(|(d, _)| d.start_ns <= time_ns);
     let found = &observed[next.checked_sub(1)?];
-    let covers = |d: &PastDwell, time_ns: i64| (d.start_ns..=d.end_ns).contains(&time_ns);
+    let covers = |d: &StoredDwell, time_ns: i64| (d.start_ns..=d.end_ns).contains(&time_ns);
     (covers(found.0, time_ns) && covers(dwell, found.0.mark.time_ns)).then_some(found)
 }
 
 /// Whether two recordings hold the same: a file, or dwells.
-fn is_same(a: &PastRecording, b: &PastRecording) -> bool {
-    let marks = |r: &PastRecording| r.dwells.iter().map(|d| d.mark).collect::<Vec<DwellMark>>();
+fn is_same(a: &StoredRecording, b: &StoredRecording) -> bool {
+    let marks = |r: &StoredRecording| r.dwells.iter().map(|d| d.mark).collect::<Vec<DwellMark>>();
     a.identities.iter().any(|file| !file.is_empty() && b.identities.contains(file))
         || also_in(&marks(a), &marks(b)).contains(&true)
 }
@@ -155,7 +155,7 @@ struct Left {
 }
 
 impl Left {
-    fn add(&mut self, only_in: Side, residual: &PastResidual, why: &str) {
+    fn add(&mut self, only_in: Side, residual: &StoredResidual, why: &str) {
         let same =
             |u: &&mut Unpaired| u.only_in == only_in && u.recording == residual.recording && u.why == why;
         match self.told.iter_mut().find(same) {

@@ -13,6 +13,7 @@
 mod alone;
 mod attempt;
 mod beyond;
+mod describe;
 mod facts;
 mod hypotheses;
 mod search;
@@ -20,7 +21,6 @@ mod spread;
 mod trial;
 mod unseen;
 mod weigh;
-mod words;
 
 use armcal_core::{SetupFinding, SetupReport};
 use armcal_stages::{Fitted, Inputs};

@@ -3,11 +3,11 @@
 use super::alone::each_alone;
 use super::attempt::{Tried, attempted};
 use super::beyond::Physics;
+use super::describe::{Side, finding, gain, moved_frame};
 use super::hypotheses::{Freedom, Hypothesis, hypotheses};
 use super::trial::{Misfit, for_trials, misfit};
 use super::unseen::unseen;
 use super::weigh::{ALIKE_FACTOR, at_the_floor, best, explains, far_enough, in_doubt, outdone, sure};
-use super::words::{Side, finding, gain, moved_frame};
 use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
 use armcal_stages::{Fitted, Inputs};
 

@@ -1,11 +1,11 @@
 //! Joints whose effort is measured in some dwells only: what follows it cannot be told in the others.
 
-use crate::seen::Seen;
+use crate::seen::RecordingData;
 use armcal_core::{Dwell, Severity, Stage, Warning, listed};
 use std::collections::BTreeMap;
 
 /// Says of each recording which joints have dwells without a measured effort, where any joint of any recording has one at all.
-pub fn warn_of_gaps(joints: &[String], seen: &mut [Seen]) {
+pub fn warn_of_gaps(joints: &[String], seen: &mut [RecordingData]) {
     let lacks = |d: &&Dwell, j: usize| {
         d.effort_nm.as_ref().and_then(|all| all.get(j)).is_none_or(|effort| !effort.is_finite())
     };

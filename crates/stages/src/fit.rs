@@ -6,7 +6,7 @@ use crate::declared::{Change, change_nominals};
 use crate::frames;
 use crate::measures::Measures;
 use crate::observe::{self, Observed};
-use crate::seen::Seen;
+use crate::seen::RecordingData;
 use armcal_calibrate::{Calibration, calibrate};
 use armcal_config::Pipeline;
 use armcal_core::{Dwell, Observation, Rejection};
@@ -24,7 +24,7 @@ pub struct Inputs {
     /// The calibration table, if there is one.
     pub board: Option<Board>,
     /// What each recording showed by itself.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<RecordingData>,
     /// Changes to the nominal values of parameters, in order.
     pub changes: Vec<Change>,
     /// Rounds of association and fit at most.

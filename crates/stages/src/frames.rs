@@ -2,7 +2,7 @@
 
 use crate::RunError;
 use crate::declared::{declare, override_parameters};
-use crate::seen::Seen;
+use crate::seen::RecordingData;
 use crate::two_arms;
 use armcal_config::{
     BoardPose, ConfigError, FrameSection, MarkerSection, MarkersOn, ModelSection, Pipeline, TableSection,
@@ -92,7 +92,7 @@ pub fn nominal_model(
     pipeline: &Pipeline,
     chain: &Chain,
     board: Option<&Board>,
-    seen: &[Seen],
+    seen: &[RecordingData],
 ) -> Result<Model, RunError> {
     let (places, lengths) = (pipeline.places(), pipeline.lengths());
     if let Some(two) = &pipeline.two_arms {
@@ -119,8 +119,8 @@ pub fn nominal_model(
     declare(&mut model, pipeline)?;
     let own = &pipeline.pool.per_recording;
     if seen.len() > 1 && !own.is_empty() {
-        let base = |s: &Seen| s.base.as_ref().map(|base| base.pose);
-        let start = |s: &Seen| RecordingStart { name: s.name.clone(), base_in_world: base(s) };
+        let base = |s: &RecordingData| s.base.as_ref().map(|base| base.pose);
+        let start = |s: &RecordingData| RecordingStart { name: s.name.clone(), base_in_world: base(s) };
         model.ask_own(seen.iter().map(start).collect(), own.clone());
     }
     Ok(model)
@@ -194,7 +194,12 @@ fn mean_of(poses: &[Pose]) -> Option<Pose> {
     Some(Pose::from_parts(position_m.into(), first * UnitQuaternion::new(turn_rad)))
 }
 
-fn board_frame(table: &TableSection, board: &Board, tilt: Tilt, seen: &Seen) -> Result<Frame, RunError> {
+fn board_frame(
+    table: &TableSection,
+    board: &Board,
+    tilt: Tilt,
+    seen: &RecordingData,
+) -> Result<Frame, RunError> {
     let tilted = board.tilted(tilt)?;
     let at = Pose::from(table.at);
     let measured_pose = seen.table.as_ref().map(|t| t.pose);

@@ -1,6 +1,6 @@
 //! The stages of a run: from files to dwells, from dwells to observations, from observations to a fit.
 //!
-//! `perceive` opens and reads recordings, aligns clocks, finds dwells; `frames` makes the nominal model of the pipeline;
+//! `preprocess` opens and reads recordings, aligns clocks, finds dwells; `frames` makes the nominal model of the pipeline;
 //! `observe` says of each dwell where on the table it was, `measures` what else it was measured against; [`fit_places`] takes
 //! them in turn with the calibration until every dwell stays in its place. What is wrong with a setup, or missing in a model, is
 //! not asked here.
@@ -18,9 +18,9 @@ pub mod joined_tips;
 pub mod links;
 pub mod measures;
 pub mod observe;
-pub mod perceive;
 mod placed;
 pub mod points;
+pub mod preprocess;
 pub mod readings;
 mod rigid;
 mod seen;
@@ -32,7 +32,7 @@ pub use declared::{Change, change_nominals, declare, override_parameters};
 pub use error::RunError;
 pub use fit::{Fitted, Inputs, Rounds, fit_places, with_effects};
 pub use placed::{Placed, PlacedBase};
-pub use seen::Seen;
+pub use seen::RecordingData;
 
 /// Hears which step begins.
 pub trait Steps {

@@ -7,7 +7,7 @@ use crate::RunError;
 use crate::joined_tips;
 use crate::observe::{Observed, observation};
 use crate::placed::Placed;
-use crate::seen::Seen;
+use crate::seen::RecordingData;
 use armcal_calibrate::{Calibration, align_frames, expected_norm_m, fit_frames, position_covariance_m2};
 use armcal_config::{Measure, MeasureKind, Pipeline};
 use armcal_core::{
@@ -43,7 +43,7 @@ struct Candidate {
 
 impl<'a> Measures<'a> {
     /// Of the dwells of all recordings.
-    pub fn of(pipeline: &'a Pipeline, seen: &[Seen]) -> Measures<'a> {
+    pub fn of(pipeline: &'a Pipeline, seen: &[RecordingData]) -> Measures<'a> {
         let measures = pipeline.measures();
         let mut all = Vec::new();
         for (recording, seen) in seen.iter().enumerate() {

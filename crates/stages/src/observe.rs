@@ -2,10 +2,10 @@
 
 use crate::RunError;
 use crate::associated::{Asked, Associated};
-use crate::seen::Seen;
+use crate::seen::RecordingData;
 use armcal_config::{BoardPose, Pipeline};
 use armcal_core::{Dwell, DwellId, FeatureId, Observation, Reference, Rejection, TipMeasurement};
-use armcal_dwell::Moment;
+use armcal_dwell::TrackSample;
 use armcal_model::Model;
 use armcal_table::{Association, Board, BoardStart, DwellTip, Place};
 use nalgebra::{Matrix3, Vector3};
@@ -31,7 +31,7 @@ pub fn associate_all(
     model: &Model,
     p: &[f64],
     boards_fitted: bool,
-    (seen, known): (&[Seen], &Associated),
+    (seen, known): (&[RecordingData], &Associated),
 ) -> Result<Vec<Option<Association>>, RunError> {
     let (Some(board), Some(table)) = (board, &pipeline.table) else {
         return Ok(seen.iter().map(|_| None).collect());
@@ -66,7 +66,7 @@ pub fn same_places(a: &[Option<Association>], b: &[Option<Association>]) -> bool
 pub fn observations(
     pipeline: &Pipeline,
     board: Option<&Board>,
-    seen: &[Seen],
+    seen: &[RecordingData],
     places: &[Option<Association>],
 ) -> Observed {
     let mut observed = Observed { observations: Vec::new(), rejections: Vec::new() };
@@ -118,7 +118,7 @@ impl Observed {
 }
 
 fn of_feature(
-    seen: &Seen,
+    seen: &RecordingData,
     dwell: &Dwell,
     feature: FeatureId,
     (reference, covariance_m2): Referenced,
@@ -127,7 +127,13 @@ fn of_feature(
 }
 
 /// What the sensor saw of the moving tip, as an observation; `index` numbers it within its recording.
-pub fn moving(pipeline: &Pipeline, recording: usize, index: usize, seen: &Seen, m: &Moment) -> Observation {
+pub fn moving(
+    pipeline: &Pipeline,
+    recording: usize,
+    index: usize,
+    seen: &RecordingData,
+    m: &TrackSample,
+) -> Observation {
     let sigma_m = pipeline.observations.sensor_sigma_mm * 1e-3;
     Observation {
         dwell: DwellId { recording, dwell: index },
@@ -234,7 +240,7 @@ fn why_not(place: Option<&Place>, untracked: String) -> String {
 /// A dwell of a recording as an observation of this reference.
 pub fn observation(
     dwell: &Dwell,
-    seen: &Seen,
+    seen: &RecordingData,
     reference: Reference,
     covariance_m2: Matrix3<f64>,
 ) -> Observation {

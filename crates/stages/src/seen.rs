@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// What one recording showed before any table or fit is involved.
 #[derive(Clone)]
-pub struct Seen {
+pub struct RecordingData {
     /// Name in the pipeline.
     pub name: String,
     /// Load at the tip, of several arms the first one's [kg].

@@ -10,7 +10,7 @@ use armcal_pipeline::add_refits;
 use armcal_report::write_all;
 use armcal_setup as setup;
 use armcal_stages::Silent;
-use armcal_stages::{frames, perceive};
+use armcal_stages::{frames, preprocess};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
@@ -94,8 +94,8 @@ fn costs(title: String, pipeline: &Path) -> Result<Costs> {
     walked?;
     let (_, chain) = frames::nominal_chain(&pipeline)?;
     let read = || -> Result<()> {
-        let recordings = perceive::open_all(&pipeline, &silent)?;
-        drop(perceive::dwells_of_all(&pipeline, &chain, &recordings, &silent, &mut drop)?);
+        let recordings = preprocess::open_all(&pipeline, &silent)?;
+        drop(preprocess::dwells_of_all(&pipeline, &chain, &recordings, &silent, &mut drop)?);
         Ok(())
     };
     let (done, reading) = spent(read);

@@ -11,10 +11,10 @@ use armcal_core::listed;
 use armcal_diagnose::{Diagnosis, Nested};
 use armcal_held_out::{LeftOut, Transfer, transfers};
 use armcal_model::EffectSpec;
-use armcal_pipeline::Settled;
+use armcal_pipeline::Converged;
 use armcal_recording::atomic;
 use armcal_report::{comparison_text, diagnosis_text, write_all};
-use armcal_result::{Comparison, PastRun, Status};
+use armcal_result::{Comparison, Status, StoredRun};
 use armcal_stages::{Fitted, frames};
 use armcal_wording::nested_sentence;
 use clap::Args;
@@ -75,9 +75,9 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     progress.step("calibrating without and with");
     effects.extend(new.iter().cloned());
     let (mut run, recordings) = settled.into_run(&pipeline);
-    let before = PastRun::of(&run);
+    let before = StoredRun::of(&run);
     armcal_pipeline::recalibrate(&mut run, &extended.pipeline, &geometry, &effects, &progress)?;
-    let comparison = Comparison::of(&before, &PastRun::of(&run));
+    let comparison = Comparison::of(&before, &StoredRun::of(&run));
 
     progress.step("writing results");
     atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
@@ -125,7 +125,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         let (path, out) = (extended.path.display(), request.out.display());
         print(&format!("\nPipeline with the effect: {path}; its results: {out}\n"))?;
     }
-    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }
 
 /// The effects the user named; `None` for those that the diagnosis will suggest.
@@ -143,7 +143,7 @@ fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>
 fn chosen(
     named: Option<Vec<EffectSpec>>,
     pipeline: &Pipeline,
-    settled: &Settled,
+    settled: &Converged,
     base: &[EffectSpec],
     progress: &Progress,
 ) -> Result<Chosen, Error> {

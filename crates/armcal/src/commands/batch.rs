@@ -62,7 +62,7 @@ pub(crate) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> 
     progress.finish();
     let (all, failed, skipped) = (receipt.done.len(), receipt.failed(), receipt.skipped);
     print(&format!("share {shard}: {all} recordings, {failed} failed, {skipped} were there already\n"))?;
-    Ok(if failed > 0 { Outcome::Doubtful } else { Outcome::Done })
+    Ok(if failed > 0 { Outcome::CompletedWithWarnings } else { Outcome::Done })
 }
 
 /// The share that was asked for, or that of this task of a Slurm job array.
@@ -88,5 +88,5 @@ fn show(campaign: &Campaign, out: &Path, written: &[PathBuf], json: bool) -> Res
         print(&campaign_text(campaign, style()))?;
         super::print_written(out, written)?;
     }
-    Ok(if campaign.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if campaign.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }

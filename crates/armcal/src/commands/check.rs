@@ -48,8 +48,8 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
             print(&if request.json { super::json_text(&judged)? } else { text::text(&judged) })?;
             Ok(match judged.judgement {
                 Judgement::Holds => Outcome::Done,
-                Judgement::Doubtful => Outcome::Doubtful,
-                Judgement::Broken => Outcome::Broken,
+                Judgement::CompletedWithWarnings => Outcome::CompletedWithWarnings,
+                Judgement::LimitExceeded => Outcome::LimitExceeded,
             })
         }
         Err(error) => Err(match report_failure(request, &error) {

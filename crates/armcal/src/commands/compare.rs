@@ -4,12 +4,12 @@ use super::{Outcome, may_write, print, style};
 use crate::error::Error;
 use armcal_recording::atomic;
 use armcal_report::{comparison_html, comparison_text};
-use armcal_result::{Comparison, PastRun};
+use armcal_result::{Comparison, StoredRun};
 use std::path::Path;
 
 /// Compares two results, prints the table (or JSON), and writes the page if one is wanted.
 pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Result<Outcome, Error> {
-    let (before, after) = (PastRun::open(before)?, PastRun::open(after)?);
+    let (before, after) = (StoredRun::open(before)?, StoredRun::open(after)?);
     may_write(html)?;
     let comparison = Comparison::of(&before, &after);
     if comparison.all.is_none() {

@@ -8,7 +8,7 @@ use armcal_deploy::set_points::table::Sheet;
 use armcal_deploy::set_points::{in_world_m, placed, recording, recording_index, target_frame, targets};
 use armcal_model::Model;
 use armcal_recording::atomic;
-use armcal_result::{PastArms, PastModel, open_model};
+use armcal_result::{StoredArms, StoredModel, open_model};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -104,7 +104,11 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     } else {
         print(&format!("{}\nWritten to {}\n", sheet.text(), request.out.display()))?;
     }
-    Ok(if past.missing.is_empty() && points.iter().all(settled) { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if past.missing.is_empty() && points.iter().all(settled) {
+        Outcome::Done
+    } else {
+        Outcome::CompletedWithWarnings
+    })
 }
 
 /// The tip that is meant: by its name, or by that of its arm.
@@ -155,7 +159,7 @@ fn settled(point: &SetPoint) -> bool {
     point.target.time_s.is_some() || point.reached.as_ref().is_none_or(|r| r.after_m < 1e-5)
 }
 
-fn drive(request: &Request, past: &PastModel, arms: &PastArms) -> Result<Drive, Error> {
+fn drive(request: &Request, past: &StoredModel, arms: &StoredArms) -> Result<Drive, Error> {
     if request.load_kg.is_some_and(|l| !(l.is_finite() && l >= 0.0)) {
         return Err(bad("--load", format!("{:?}", request.load_kg), "give a mass in kg, zero or more"));
     }
@@ -185,7 +189,7 @@ fn drive(request: &Request, past: &PastModel, arms: &PastArms) -> Result<Drive, 
 }
 
 /// `0, -30, 10` in display units as a joint vector, SI.
-fn joints(words: &str, arms: &PastArms) -> Result<Vec<f64>, Error> {
+fn joints(words: &str, arms: &StoredArms) -> Result<Vec<f64>, Error> {
     let chain = arms.geometry.chain();
     let parsed: Option<Vec<f64>> = words.split(',').map(|word| word.trim().parse().ok()).collect();
     let expected = chain.joint_names().len();
@@ -198,8 +202,8 @@ fn joints(words: &str, arms: &PastArms) -> Result<Vec<f64>, Error> {
 
 /// What holds for every set-point.
 fn notes(
-    past: &PastModel,
-    arms: &PastArms,
+    past: &StoredModel,
+    arms: &StoredArms,
     (frame, held): (TargetFrame, &[(usize, f64)]),
     conditions: &armcal_compensate::Conditions,
 ) -> Vec<String> {

@@ -5,20 +5,20 @@ use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{concluded_text, diagnosis_text, past_diagnosis, summary_json};
-use armcal_result::{Conclusions, PastRun, Status};
+use armcal_report::{concluded_text, diagnosis_text, stored_diagnosis, summary_json};
+use armcal_result::{Conclusions, Status, StoredRun};
 use std::path::Path;
 
 /// Diagnoses a pipeline, or prints the diagnosis of a finished run (`run.mcap` or its folder).
 pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     if input.extension().is_none_or(|e| e != "toml") {
-        let past = PastRun::open(input)?;
+        let past = StoredRun::open(input)?;
         if json {
             print(&super::json_text(&past.summary["diagnosis"])?)?;
         } else {
             let concluded = Conclusions::open(input)?;
             print(
-                &concluded.map_or_else(|| past_diagnosis(&past, style()), |c| concluded_text(&c, style())),
+                &concluded.map_or_else(|| stored_diagnosis(&past, style()), |c| concluded_text(&c, style())),
             )?;
         }
         let lost = past.summary["status"] == Status::DataLost.word();
@@ -28,7 +28,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
             let lost = Severity::DataLost;
             crate::stdout::tell(&[Warning::new(lost, Stage::Recording, "recording-damaged", subject, why)]);
         }
-        return Ok(if lost { Outcome::Doubtful } else { Outcome::Done });
+        return Ok(if lost { Outcome::CompletedWithWarnings } else { Outcome::Done });
     }
     let pipeline = Pipeline::load(input)?;
     let progress = Progress::new();
@@ -40,5 +40,5 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
     } else {
         print(&diagnosis_text(&run, style()))?;
     }
-    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }

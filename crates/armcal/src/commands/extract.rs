@@ -56,7 +56,7 @@ pub fn run(asked: &Request) -> Result<Outcome, Error> {
     })?;
     print(&if asked.json { json(&extracted, report)? } else { text(&asked.out, &extracted, report) })?;
     let lost = report.warnings.iter().any(|w| w.severity >= Severity::Inadequate);
-    Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
+    Ok(if lost { Outcome::CompletedWithWarnings } else { Outcome::Done })
 }
 
 /// The topics that a pipeline reads, as patterns that match nothing else.

@@ -86,7 +86,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         atomic::write_over(path, text.as_bytes(), over).map_err(Error::Output)?;
     }
     print(&if request.json { json_text(&super::with_losses(json_of(&proposal)))? } else { text(&proposal) })?;
-    Ok(if proposal.runs() { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if proposal.runs() { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }
 
 /// Whether a file may be written: it is not there, or the user wants it replaced and it is one of armcal's.

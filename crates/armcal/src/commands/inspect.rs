@@ -7,7 +7,7 @@ use armcal_core::Severity;
 use armcal_core::printable;
 use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport, shortened};
 use armcal_report::RULED;
-use armcal_stages::{RunError, Silent, perceive};
+use armcal_stages::{RunError, Silent, preprocess};
 use comfy_table::Table;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
         return Err(RunError::NoMessages { recording: name.clone() }.into());
     }
     let lost = reports.iter().flat_map(|(_, r)| &r.warnings).any(|w| w.severity >= Severity::Inadequate);
-    Ok(if lost { Outcome::Doubtful } else { Outcome::Done })
+    Ok(if lost { Outcome::CompletedWithWarnings } else { Outcome::Done })
 }
 
 /// One recording in the JSON.
@@ -53,7 +53,7 @@ struct Named<'a> {
 
 fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
     let pipeline = Pipeline::load(path)?;
-    let recordings = perceive::open_all(&pipeline, &Silent)?;
+    let recordings = preprocess::open_all(&pipeline, &Silent)?;
     let entries = pipeline.recordings.iter().zip(&recordings);
     entries
         .map(|(entry, recording)| {

@@ -33,9 +33,9 @@ pub enum Outcome {
     /// Done.
     Done,
     /// Done, but data were lost or the model is inadequate.
-    Doubtful,
+    CompletedWithWarnings,
     /// Done, and the result breaks a limit.
-    Broken,
+    LimitExceeded,
 }
 
 /// What recordings lost, in the JSON of a result, where anything was.

@@ -8,7 +8,7 @@ use armcal_calibrate::{HoldoutConfig, calibrate};
 use armcal_config::Pipeline;
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
-use armcal_pipeline::Settled;
+use armcal_pipeline::Converged;
 use armcal_plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
 use armcal_report::{number, plain_table, table_text};
 use armcal_stages::{Fitted, frames};
@@ -124,7 +124,11 @@ fn allowed(request: &Request, joints: &[String]) -> Result<Allowed, Error> {
 }
 
 /// The calibrated model with the effects that are beyond doubt, and its parameters.
-fn with_certain(pipeline: &Pipeline, settled: &Settled, open: &Standing) -> Result<(Model, Vec<f64>), Error> {
+fn with_certain(
+    pipeline: &Pipeline,
+    settled: &Converged,
+    open: &Standing,
+) -> Result<(Model, Vec<f64>), Error> {
     let Fitted { model, observations, session, calibration, .. } = &settled.fitted;
     if open.certain.is_empty() {
         return Ok((model.clone(), calibration.fit.values()));
@@ -135,7 +139,7 @@ fn with_certain(pipeline: &Pipeline, settled: &Settled, open: &Standing) -> Resu
 }
 
 /// How well the sensor saw the tip in the dwells of these recordings (their median).
-fn tracking(pipeline: &Pipeline, settled: &Settled) -> Option<Tracking> {
+fn tracking(pipeline: &Pipeline, settled: &Converged) -> Option<Tracking> {
     if !pipeline.tip_is_tracked() || !pipeline.observations.tracked {
         return None;
     }

@@ -35,5 +35,5 @@ pub fn run(
         print(&terminal(&run, style(), detail))?;
         print_written(out, &written)?;
     }
-    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }

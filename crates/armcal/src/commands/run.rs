@@ -37,5 +37,5 @@ pub(super) fn results(pipeline: &Pipeline, out: &Path) -> Vec<PathBuf> {
 }
 
 fn outcome(status: Status) -> Outcome {
-    if status == Status::Ok { Outcome::Done } else { Outcome::Doubtful }
+    if status == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings }
 }

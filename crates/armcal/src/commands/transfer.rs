@@ -14,7 +14,7 @@ pub fn run(asked: &Asked<'_>, json: bool) -> Result<Outcome, Error> {
     let transfer = between(asked, &progress)?;
     progress.finish();
     print(&if json { super::json_text(&transfer)? } else { text(&transfer) })?;
-    Ok(if transfer.harms() { Outcome::Doubtful } else { Outcome::Done })
+    Ok(if transfer.harms() { Outcome::CompletedWithWarnings } else { Outcome::Done })
 }
 
 fn text(transfer: &SessionTransfer) -> String {

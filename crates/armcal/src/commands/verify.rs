@@ -30,5 +30,5 @@ pub fn run(result: &Path, pipeline: &Path, out: Option<&Path>, json: bool) -> Re
     } else {
         print(&verification_text(&verification, style()))?;
     }
-    Ok(if verification.status() == Status::Ok { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if verification.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }

@@ -3,7 +3,7 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::view::{Bench, Given, serve};
+use crate::view::{Given, RefitSession, serve};
 use armcal_recording::input::{Kind, read_to_string};
 use armcal_report::summary_json;
 use std::path::Path;
@@ -13,7 +13,7 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
     let given = Given::by(input)?;
     let path = given.pipeline.clone();
     let progress = Progress::new();
-    let bench = Bench::of(given, &progress)?;
+    let bench = RefitSession::of(given, &progress)?;
     progress.finish();
     let written = read_to_string(&input.join("summary.json"), Kind::Data);
     let now = summary_json(bench.run())?;

@@ -12,7 +12,7 @@ use armcal_formats::Format;
 use armcal_recording::atomic;
 use armcal_recording::input::Kind;
 use armcal_report::{plain_table, table_text};
-use armcal_result::{PastArms, PastModel, open_model};
+use armcal_result::{StoredArms, StoredModel, open_model};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use comfy_table::ContentArrangement;
@@ -64,11 +64,11 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     } else {
         print(&format!("{}\nWritten to {}\n", said.text(&source.skeleton.name), out.display()))?;
     }
-    Ok(if past.missing.is_empty() { Outcome::Done } else { Outcome::Doubtful })
+    Ok(if past.missing.is_empty() { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }
 
 /// The arm that is meant, of several by its name.
-fn arm(arms: &PastArms, asked: Option<&str>) -> Result<usize, Error> {
+fn arm(arms: &StoredArms, asked: Option<&str>) -> Result<usize, Error> {
     let names: Vec<&str> = arms.model.chain().arms().iter().map(|arm| arm.name.as_str()).collect();
     let bad = |problem: String| Error::BadOption {
         option: "--arm",
@@ -112,7 +112,7 @@ struct Said<'a> {
     made: &'a Made,
     left: ErrorStats,
     over: &'static str,
-    past: &'a PastModel,
+    past: &'a StoredModel,
 }
 
 impl Said<'_> {

@@ -1,9 +1,9 @@
 //! The server: one page, its choices, refits, and keeping a pipeline.
 
-use super::bench::Bench;
 use super::connections::{self, REQUEST_TIME};
 use super::guard::Guard;
 use super::requests::{MOST_EFFECTS, Wanted};
+use super::session::RefitSession;
 use super::turns::{MOST_ASKED, Turns};
 use crate::error::Error;
 use armcal_calibrate::Stop;
@@ -23,15 +23,19 @@ const LARGEST_BODY: usize = 64 * 1024;
 
 /// Serves a bench on 127.0.0.1 until the process ends; calls `ready` with the address when it listens. Port 0 takes any
 /// free one.
-pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str) -> Result<(), Error>) -> Result<(), Error> {
+pub fn serve(
+    session: RefitSession,
+    port: u16,
+    ready: impl FnOnce(&str) -> Result<(), Error>,
+) -> Result<(), Error> {
     let failed = |what: &'static str| move |source| Error::Serve { what, port, source };
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed("listening"))?;
     let port = listener.local_addr().map_err(failed("listening"))?.port();
     listener.set_nonblocking(true).map_err(failed("listening"))?;
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
-    let html = Bytes::from(bench.html()?);
-    let app = routes(Arc::new(Served { bench, html, turns: Turns::new() }), guard);
+    let html = Bytes::from(session.html()?);
+    let app = routes(Arc::new(Served { session, html, turns: Turns::new() }), guard);
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     // A thread each for the one that is computed and those that are written.
     let runtime =
@@ -45,7 +49,7 @@ pub fn serve(bench: Bench, port: u16, ready: impl FnOnce(&str) -> Result<(), Err
 }
 
 struct Served {
-    bench: Bench,
+    session: RefitSession,
     html: Bytes,
     turns: Turns,
 }
@@ -100,7 +104,7 @@ async fn page(State(served): State<Arc<Served>>) -> Response {
 }
 
 async fn choices(State(served): State<Arc<Served>>) -> Response {
-    answer(StatusCode::OK, &json!(served.bench.choices()))
+    answer(StatusCode::OK, &json!(served.session.choices()))
 }
 
 /// Stops a refit when nobody waits for it any more: its request is dropped with the connection.
@@ -117,18 +121,18 @@ async fn refit(State(served): State<Arc<Served>>, body: Bytes) -> Response {
     let waiting = Waiting(Stop::default());
     let stop = waiting.0.clone();
     let turn = served.turns.turn().await;
-    asked(served, body, move |bench, wanted| {
+    asked(served, body, move |session, wanted| {
         let _held = (place, turn);
-        bench.refit(wanted, &stop)
+        session.refit(wanted, &stop)
     })
     .await
 }
 
 async fn keep(State(served): State<Arc<Served>>, body: Bytes) -> Response {
     let Some(place) = served.turns.place() else { return too_many() };
-    asked(served, body, move |bench, wanted| {
+    asked(served, body, move |session, wanted| {
         let _held = place;
-        let path = bench.keep(wanted)?;
+        let path = session.keep(wanted)?;
         Ok(json!({ "pipeline": path.to_string_lossy() }).to_string())
     })
     .await
@@ -143,7 +147,7 @@ fn too_many() -> Response {
 async fn asked(
     served: Arc<Served>,
     body: Bytes,
-    what: impl FnOnce(&Bench, &Wanted) -> Result<String, Error> + Send + 'static,
+    what: impl FnOnce(&RefitSession, &Wanted) -> Result<String, Error> + Send + 'static,
 ) -> Response {
     let wanted: Wanted = match serde_json::from_slice(&body) {
         Ok(wanted) => wanted,
@@ -155,7 +159,7 @@ async fn asked(
         let why = format!("{} effects are wanted at once, and {MOST_EFFECTS} at most can be", wanted.count());
         return answer(StatusCode::BAD_REQUEST, &json!({ "error": why }));
     }
-    let done = tokio::task::spawn_blocking(move || what(&served.bench, &wanted)).await;
+    let done = tokio::task::spawn_blocking(move || what(&served.session, &wanted)).await;
     match done {
         Ok(Ok(text)) => ([(header::CONTENT_TYPE, "application/json")], text).into_response(),
         Ok(Err(e)) => answer(StatusCode::UNPROCESSABLE_ENTITY, &json!({ "error": e.to_string() })),

@@ -10,12 +10,12 @@ pub mod targets;
 use crate::error::DeployError;
 use armcal_compensate::{Target, TargetFrame};
 use armcal_core::{FeatureId, Unit};
-use armcal_result::{PastArms, PastModel};
+use armcal_result::{StoredArms, StoredModel};
 use nalgebra::{Point3, Vector3};
 use targets::Wanted;
 
 /// The frame of that name: `world`, `base`, or `board.<recording>`; what there is, otherwise.
-pub fn target_frame(past: &PastModel, name: &str) -> Result<TargetFrame, String> {
+pub fn target_frame(past: &StoredModel, name: &str) -> Result<TargetFrame, String> {
     match name {
         "world" => Ok(TargetFrame::World),
         "base" => Ok(TargetFrame::Base),
@@ -29,7 +29,7 @@ pub fn target_frame(past: &PastModel, name: &str) -> Result<TargetFrame, String>
 }
 
 /// A recording of the run by its name; what there is, otherwise.
-pub fn recording_index(past: &PastModel, name: &str) -> Result<usize, String> {
+pub fn recording_index(past: &StoredModel, name: &str) -> Result<usize, String> {
     past.recordings.iter().position(|r| r.name == name).ok_or_else(|| {
         let names: Vec<&str> = past.recordings.iter().map(|r| r.name.as_str()).collect();
         format!("the run has no recording `{name}`; it has {}", names.join(", "))
@@ -38,7 +38,7 @@ pub fn recording_index(past: &PastModel, name: &str) -> Result<usize, String> {
 
 /// Targets as the model takes them.
 pub fn placed(
-    arms: &PastArms,
+    arms: &StoredArms,
     (feature, frame): (FeatureId, TargetFrame),
     wanted: &[Wanted],
 ) -> Result<Vec<Target>, DeployError> {
@@ -50,7 +50,7 @@ pub fn placed(
 }
 
 /// Where the targets are in the world as calibrated [m].
-pub fn in_world_m(arms: &PastArms, frame: TargetFrame, target: &Target) -> Vector3<f64> {
+pub fn in_world_m(arms: &StoredArms, frame: TargetFrame, target: &Target) -> Vector3<f64> {
     let board = match frame {
         TargetFrame::Board(recording) => arms.model.board_in_world(&arms.values, recording),
         TargetFrame::World | TargetFrame::Base => None,

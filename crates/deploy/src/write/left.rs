@@ -4,7 +4,7 @@ use super::Source;
 use crate::error::DeployError;
 use armcal_core::{DwellId, ErrorStats, FeatureId, Observation, Reference};
 use armcal_formats::zeros::JointZeros;
-use armcal_result::{OBSERVATIONS_FILE, PastModel, PastObservations};
+use armcal_result::{OBSERVATIONS_FILE, StoredModel, StoredObservations};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -20,11 +20,11 @@ impl Recorded {
     ///
     /// # Errors
     /// A file of observations that cannot be read.
-    pub fn beside(result: &Path, past: &PastModel) -> Result<Recorded, DeployError> {
+    pub fn beside(result: &Path, past: &StoredModel) -> Result<Recorded, DeployError> {
         let folder = if result.is_dir() { result } else { result.parent().unwrap_or(Path::new("")) };
         let path = folder.join(OBSERVATIONS_FILE);
         if path.is_file() {
-            let observed = PastObservations::open(&path)?;
+            let observed = StoredObservations::open(&path)?;
             if of_this_result(&observed, past) {
                 let observations = observed.recordings.into_iter().flat_map(|r| r.observations).collect();
                 return Ok(Recorded { observations, what: "observations" });
@@ -62,7 +62,7 @@ impl Recorded {
     }
 }
 
-fn of_this_result(observed: &PastObservations, past: &PastModel) -> bool {
+fn of_this_result(observed: &StoredObservations, past: &StoredModel) -> bool {
     let identities =
         observed.recordings.iter().map(|r| r.files.iter().map(|f| &f.identity).collect::<Vec<_>>());
     observed.pipeline == past.pipeline

@@ -12,7 +12,7 @@ use armcal_formats::ur::{UrKinematics, hash_in};
 use armcal_formats::zeros::JointZeros;
 use armcal_formats::{Format, FormatError, mjcf, sdf, urdf, xacro};
 use armcal_model::{Moving, Place, Skeleton};
-use armcal_result::{PastArms, PastModel, marked_xml};
+use armcal_result::{StoredArms, StoredModel, marked_xml};
 use left::Recorded;
 use std::path::Path;
 
@@ -25,9 +25,9 @@ const SHOWN_DEG: f64 = 5e-5;
 /// The arm that is written.
 pub struct Source<'a> {
     /// The result.
-    pub past: &'a PastModel,
+    pub past: &'a StoredModel,
     /// Its models.
-    pub arms: &'a PastArms,
+    pub arms: &'a StoredArms,
     /// Which arm, of several.
     pub arm: usize,
     /// Its links and joints as calibrated, effects left out.
@@ -52,7 +52,7 @@ pub struct Made {
 
 impl<'a> Source<'a> {
     /// An arm of the result.
-    pub fn of(past: &'a PastModel, arms: &'a PastArms, arm: usize) -> Source<'a> {
+    pub fn of(past: &'a StoredModel, arms: &'a StoredArms, arm: usize) -> Source<'a> {
         let root = past.urdf(arm).map_or("base", |(_, base_link)| base_link);
         Source { past, arms, arm, skeleton: arms.model.skeleton(arm, &arms.values, root) }
     }

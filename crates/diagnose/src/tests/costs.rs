@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use super::{entry, own, planted, quick, room};
+use super::{conditioned, entry, own, planted, quick};
 use crate::Scan;
 use crate::config::DiagnosisConfig;
 
@@ -14,17 +14,17 @@ fn close(found: f64, by_hand: f64) {
 fn costs_are_three_nats_an_amplitude_and_minus_ln_of_the_prior() {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();
-    let room = room(&p, &config);
-    let costs = room.costs(&config);
-    let entries = room.weighed.entries.len() as f64;
+    let conditioned = conditioned(&p, &config);
+    let costs = conditioned.costs(&config);
+    let entries = conditioned.weighed.entries.len() as f64;
     close(costs.of_nothing(), 2f64.ln());
-    close(costs.of_unlisted(), 12.0 - (0.1 / room.weighed.unlisted.len() as f64).ln());
-    let play = costs.of_entry(entry(&room.weighed, "backlash:1"));
+    close(costs.of_unlisted(), 12.0 - (0.1 / conditioned.weighed.unlisted.len() as f64).ln());
+    let play = costs.of_entry(entry(&conditioned.weighed, "backlash:1"));
     close(play, 3.0 - (0.4 / entries).ln());
     // Prior times what was said: of what says nothing at all, the priors are left.
     let all = (-costs.of_nothing()).exp()
         + entries * (3.0 - play).exp()
-        + room.weighed.unlisted.len() as f64 * (12.0 - costs.of_unlisted()).exp();
+        + conditioned.weighed.unlisted.len() as f64 * (12.0 - costs.of_unlisted()).exp();
     close(all, 1.0);
 }
 
@@ -38,12 +38,12 @@ fn costs_are_those_of_the_configuration() {
         prior_unknown: 0.1,
         ..quick()
     };
-    let room = room(&p, &config);
-    let costs = room.costs(&config);
+    let conditioned = conditioned(&p, &config);
+    let costs = conditioned.costs(&config);
     close(costs.of_nothing(), 5f64.ln());
-    let play = costs.of_entry(entry(&room.weighed, "backlash:1"));
-    close(play, 5.0 - (0.7 / room.weighed.entries.len() as f64).ln());
-    close(costs.of_unlisted(), 20.0 - (0.1 / room.weighed.unlisted.len() as f64).ln());
+    let play = costs.of_entry(entry(&conditioned.weighed, "backlash:1"));
+    close(play, 5.0 - (0.7 / conditioned.weighed.entries.len() as f64).ln());
+    close(costs.of_unlisted(), 20.0 - (0.1 / conditioned.weighed.unlisted.len() as f64).ln());
 }
 
 #[test]
@@ -52,9 +52,9 @@ fn a_shape_that_was_searched_for_costs_an_amplitude_and_the_search_more() {
     let point = crate::Candidate { spec: "backlash:1,shape=3".into(), ..own(&p, "backlash:1") };
     p.scans.push(Scan { tried: 20, ..Scan::of("backlash:1", vec![point]) });
     let config = quick();
-    let room = room(&p, &config);
-    let costs = room.costs(&config);
-    let [given, searched] = ["backlash:1", "backlash:1,shape=3"].map(|s| entry(&room.weighed, s));
+    let conditioned = conditioned(&p, &config);
+    let costs = conditioned.costs(&config);
+    let [given, searched] = ["backlash:1", "backlash:1,shape=3"].map(|s| entry(&conditioned.weighed, s));
     close(costs.of_entry(searched) - costs.of_entry(given), 3.0 + 20f64.ln());
 }
 
@@ -69,12 +69,12 @@ fn what_came_out_as_no_such_mechanism_can_costs_two_amplitudes_more() {
     let turned = crate::Columns::Dense(std::sync::Arc::new(-1.0 * play.columns.dense(&p.dwells, 1.0)));
     p.candidates.push(crate::Candidate { spec: "turned".into(), columns: turned, ..play });
     let config = quick();
-    let room = room(&p, &config);
-    let costs = room.costs(&config);
-    let [play, turned] = ["backlash:1", "turned"].map(|s| entry(&room.weighed, s));
-    assert!(!room.judge(turned, &config).impossible.is_empty());
-    assert!(room.judge(play, &config).impossible.is_empty());
+    let conditioned = conditioned(&p, &config);
+    let costs = conditioned.costs(&config);
+    let [play, turned] = ["backlash:1", "turned"].map(|s| entry(&conditioned.weighed, s));
+    assert!(!conditioned.judge(turned, &config).impossible.is_empty());
+    assert!(conditioned.judge(play, &config).impossible.is_empty());
     close(costs.of_entry(turned) - costs.of_entry(play), 6.0);
     // What it must gain is what it costs without: a sign is no freedom.
-    close(room.judge(turned, &config).cost_nats, room.judge(play, &config).cost_nats);
+    close(conditioned.judge(turned, &config).cost_nats, conditioned.judge(play, &config).cost_nats);
 }

@@ -4,23 +4,31 @@
 
 use super::*;
 use crate::Problem;
-use crate::tests::{entry, in_rooms, own, planted, quick};
+use crate::tests::{entry, own, planted, quick, with_conditioned};
 
 /// Names as if a search had ended with them, and those that are left of them.
 fn left(p: &Problem, specs: &[&str]) -> Vec<String> {
     let config = quick();
-    let found = in_rooms(p, &config, |rooms| {
+    let found = with_conditioned(p, &config, |conditioned_problems| {
         let mut accepted = Vec::new();
         for spec in specs {
             let others: Vec<Candidate> = specs.iter().filter(|s| *s != spec).map(|s| own(p, s)).collect();
-            let room = rooms.with(&others)?;
-            let judged = room.judge(entry(&room.weighed, spec), &config);
+            let conditioned = conditioned_problems.with(&others)?;
+            let judged = conditioned.judge(entry(&conditioned.weighed, spec), &config);
             let grade = judged.grade(&config);
             let set = vec![judged.entry];
             let (instead_of, ranked) = Default::default();
-            accepted.push(Accepted { candidate: own(p, spec), judged, room, grade, set, instead_of, ranked });
+            accepted.push(Accepted {
+                candidate: own(p, spec),
+                judged,
+                conditioned,
+                grade,
+                set,
+                instead_of,
+                ranked,
+            });
         }
-        fewer(rooms, Found { accepted, may_be_shape: false }, &config)
+        fewer(conditioned_problems, Found { accepted, may_be_shape: false }, &config)
     });
     let mut names: Vec<String> = found.unwrap().accepted.iter().map(|a| a.candidate.spec.clone()).collect();
     names.sort();

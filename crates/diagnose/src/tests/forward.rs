@@ -5,7 +5,7 @@
 use super::*;
 use crate::LinearRefit;
 use crate::problem::Columns;
-use crate::tests::{arm, in_rooms, outside, own, quick, room};
+use crate::tests::{arm, conditioned, outside, own, quick, with_conditioned};
 use crate::weigh::weigh;
 use std::sync::Arc;
 
@@ -82,10 +82,10 @@ fn a_candidate_is_found_by_name_and_else_by_family_and_target() {
 }
 
 /// A room in which only what is given was weighed; `predicts` are the columns of the planted effect.
-pub(crate) fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> Room {
+pub(crate) fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> ConditionedProblem {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();
-    let mut r = Rc::try_unwrap(room(&p, &config)).expect("the room is ours");
+    let mut r = Rc::try_unwrap(conditioned(&p, &config)).expect("the room is ours");
     r.weighed.p_nothing = 0.01;
     r.weighed.entries.retain(|e| e.candidate.spec == entry.0);
     r.weighed.entries[0].ln_evidence = entry.1;
@@ -99,9 +99,9 @@ fn an_earlier_step_that_later_ones_made_superfluous_leaves() {
     let config = quick();
     let left = |specs: &[&str]| {
         let mut steps = strong(&p, specs);
-        in_rooms(&p, &config, |rooms| {
-            let room = rooms.with(&[]).unwrap();
-            drop_superseded(&mut steps, rooms, &room, &config);
+        with_conditioned(&p, &config, |conditioned_problems| {
+            let conditioned = conditioned_problems.with(&[]).unwrap();
+            drop_superseded(&mut steps, conditioned_problems, &conditioned, &config);
         });
         steps.into_iter().map(|s| s.candidate.spec).collect::<Vec<_>>()
     };
@@ -118,7 +118,10 @@ fn steps_are_confirmed_among_each_other() {
     let p = planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3);
     let config = quick();
     let confirmed = |p: &Problem, steps: Vec<Step>, cells: &[Candidate]| {
-        let found = in_rooms(p, &config, |rooms| confirm(rooms, steps, cells, &config)).unwrap();
+        let found = with_conditioned(p, &config, |conditioned_problems| {
+            confirm(conditioned_problems, steps, cells, &config)
+        })
+        .unwrap();
         found.into_iter().map(|a| (a.candidate.spec, a.grade)).collect::<Vec<_>>()
     };
     let both = ["backlash:1", "zero_drift:2"].map(|s| (s.to_string(), Grade::Named));
@@ -158,7 +161,10 @@ fn of_two_that_hide_each_other_the_weaker_leaves() {
     };
     p.candidates.push(twin);
     let left = |specs: &[&str]| {
-        let found = in_rooms(&p, &config, |rooms| confirm(rooms, strong(&p, specs), &[], &config)).unwrap();
+        let found = with_conditioned(&p, &config, |conditioned_problems| {
+            confirm(conditioned_problems, strong(&p, specs), &[], &config)
+        })
+        .unwrap();
         found.into_iter().map(|a| a.candidate.spec).collect::<Vec<_>>()
     };
     let one = left(&["backlash:1", "twin"]);
@@ -166,16 +172,19 @@ fn of_two_that_hide_each_other_the_weaker_leaves() {
     assert_eq!(left(&["twin", "backlash:1"]), one, "whatever the order");
     let alone = |spec: &str| {
         let other = own(&p, if spec == "twin" { "backlash:1" } else { "twin" });
-        let room = in_rooms(&p, &config, |rooms| rooms.with(&[other]).unwrap());
-        let entry = entry_of(&room.weighed, &own(&p, spec)).unwrap();
-        room.judge(entry, &config).gain.nats
+        let conditioned = with_conditioned(&p, &config, |conditioned_problems| {
+            conditioned_problems.with(&[other]).unwrap()
+        });
+        let entry = entry_of(&conditioned.weighed, &own(&p, spec)).unwrap();
+        conditioned.judge(entry, &config).gain.nats
     };
     let stronger = if alone("twin") > alone("backlash:1") { "twin" } else { "backlash:1" };
     assert_eq!(one, [stronger]);
 }
 
 fn stepped(p: &Problem, known: Vec<Step>, config: &DiagnosisConfig) -> (Vec<Step>, bool) {
-    in_rooms(p, config, |rooms| forward(rooms, known, &[], config)).unwrap()
+    with_conditioned(p, config, |conditioned_problems| forward(conditioned_problems, known, &[], config))
+        .unwrap()
 }
 
 #[test]
@@ -190,7 +199,10 @@ fn forward_steps_end_when_nothing_is_left_or_enough_were_found() {
     assert_eq!(stepped(&p, Vec::new(), &DiagnosisConfig { max_effects: 0, ..quick() }).0.len(), 0);
     // What stands in the base already is not found again.
     let shapes = [own(&p, "backlash:1")];
-    let (steps, _) = in_rooms(&p, &config, |rooms| forward(rooms, Vec::new(), &shapes, &config)).unwrap();
+    let (steps, _) = with_conditioned(&p, &config, |conditioned_problems| {
+        forward(conditioned_problems, Vec::new(), &shapes, &config)
+    })
+    .unwrap();
     assert_eq!(names(&steps), ["zero_drift:2"]);
 }
 
@@ -199,7 +211,7 @@ fn a_step_carries_what_it_said() {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();
     let (steps, _) = stepped(&p, Vec::new(), &config);
-    let r = room(&p, &config);
+    let r = conditioned(&p, &config);
     let weighed = &r.weighed;
     let entry = entry_of(weighed, &own(&p, "backlash:1")).unwrap();
     let s = &steps[0];
@@ -264,8 +276,9 @@ fn only_what_has_no_name_at_once_is_tried_at_its_own_size() {
     let asked = |config: &DiagnosisConfig| {
         let mut refit = Refined { linear: LinearRefit::new(p.clone()), asked: Vec::new() };
         let first = (p.clone(), weigh(&p, config));
-        let mut rooms = Rooms::new(&mut refit, vec![true; p.dwells.len()], first, config);
-        let (steps, _) = forward(&mut rooms, Vec::new(), &[], config).unwrap();
+        let mut conditioned_problems =
+            ConditionedProblems::new(&mut refit, vec![true; p.dwells.len()], first, config);
+        let (steps, _) = forward(&mut conditioned_problems, Vec::new(), &[], config).unwrap();
         (refit.asked, steps.len())
     };
     assert_eq!(asked(&quick()), (vec![], 1));

@@ -6,26 +6,26 @@ use super::*;
 use crate::problem::{Candidate, Columns};
 use crate::settle::{Instead, Scored};
 use crate::tests::arm::SIGMA_M;
-use crate::tests::{arm, entry, in_rooms, own, planted, quick, room, scatter};
+use crate::tests::{arm, conditioned, entry, own, planted, quick, scatter, with_conditioned};
 use armcal_core::DwellId;
 use std::sync::Arc;
 
 /// The entry of a problem's first room as it would be accepted.
 fn accepted(p: &Problem, spec: &str) -> Accepted {
     let config = quick();
-    let room = room(p, &config);
-    let judged = room.judge(entry(&room.weighed, spec), &config);
+    let conditioned = conditioned(p, &config);
+    let judged = conditioned.judge(entry(&conditioned.weighed, spec), &config);
     let grade = judged.grade(&config);
     let set = vec![judged.entry];
     let (instead_of, ranked) = Default::default();
-    Accepted { candidate: own(p, spec), grade, judged, room, instead_of, set, ranked }
+    Accepted { candidate: own(p, spec), grade, judged, conditioned, instead_of, set, ranked }
 }
 
 fn searched(p: &Problem) -> Search {
     let config = quick();
-    in_rooms(p, &config, |rooms| {
-        let mut found = search(rooms, &[], &config)?;
-        settle(&mut found, rooms, &config)?;
+    with_conditioned(p, &config, |conditioned_problems| {
+        let mut found = search(conditioned_problems, &[], &config)?;
+        settle(&mut found, conditioned_problems, &config)?;
         Ok::<_, DiagnoseError>(found)
     })
     .unwrap()
@@ -37,17 +37,20 @@ fn codes(all: &[Warning]) -> Vec<&str> {
 
 fn assembled(p: &Problem, search: &Search) -> Diagnosis {
     let config = quick();
-    let room = room(p, &config);
-    let ranking = in_rooms(p, &config, |rooms| Ranking::of(search, &room, rooms, &config));
-    let before = Before::of(&room, ranking, &config);
+    let conditioned = conditioned(p, &config);
+    let ranking = with_conditioned(p, &config, |conditioned_problems| {
+        Ranking::of(search, &conditioned, conditioned_problems, &config)
+    });
+    let before = Before::of(&conditioned, ranking, &config);
     assemble(before, (p.dwells.len(), Vec::new()), search, &config)
 }
 
 /// Probability of what is not listed where no name was found.
 fn p_unlisted(p: &Problem) -> f64 {
     let (config, nothing_found) = (quick(), searched(&planted(&[], 0, 6)));
-    let ranking =
-        in_rooms(p, &config, |rooms| Ranking::of(&nothing_found, &room(p, &config), rooms, &config));
+    let ranking = with_conditioned(p, &config, |conditioned_problems| {
+        Ranking::of(&nothing_found, &conditioned(p, &config), conditioned_problems, &config)
+    });
     ranking.p_unlisted
 }
 
@@ -59,7 +62,7 @@ fn nothing_found_is_told_with_the_probability_of_nothing() {
     assert_eq!((d.verdict, d.probability, d.names.len()), (Verdict::NothingMissing, Some(d.p_nothing), 0));
     assert!(d.p_nothing > 0.5 && d.unknown.is_none() && d.unlisted.is_empty());
     let config = quick();
-    let first = room(&p, &config);
+    let first = conditioned(&p, &config);
     let top = first.judge(first.weighed.ranking()[0], &config);
     assert_eq!(d.p_adjusted, top.own().p_adjusted, "that of what stands out most");
     assert!(d.p_adjusted > 0.05, "{}", d.p_adjusted);
@@ -99,7 +102,7 @@ fn two_names_or_a_doubt_are_ambiguous() {
     assert_eq!(d.verdict, Verdict::Ambiguous);
     assert_eq!(d.names, ["backlash:1", NOT_LISTED]);
     let mut s = searched(&p);
-    let other = entry(&s.accepted[0].room.weighed, "scale:2");
+    let other = entry(&s.accepted[0].conditioned.weighed, "scale:2");
     s.accepted[0].set.push(other);
     let d = assembled(&p, &s);
     assert_eq!(
@@ -126,7 +129,7 @@ fn an_effects_probability_is_that_of_its_set_and_of_nothing_else() {
     let config = quick();
     let mut a = searched(&planted(&[("backlash:1", 1.0)], 0, 3)).accepted.remove(0);
     let score = a.ranked[0].score.clone();
-    let other = entry(&a.room.weighed, "scale:2");
+    let other = entry(&a.conditioned.weighed, "scale:2");
     let share = |what, weight| Scored { what, score: score.clone(), weight };
     let own = Instead::Entry(a.judged.entry);
     a.ranked = vec![share(own, 0.5), share(Instead::Entry(other), 0.3)];
@@ -149,7 +152,7 @@ fn alike_signatures_are_listed_as_pairs() {
     let config = quick();
     let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
     let all = |p: &Problem| {
-        let r = room(p, &config);
+        let r = conditioned(p, &config);
         confused(&r.problem, &r.weighed, &config)
     };
     assert!(!all(&p).iter().any(|pair| pair.contains(&"backlash:1".to_string())));

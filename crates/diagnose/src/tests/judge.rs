@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::scatter::Correlation;
-use crate::tests::{entry, outside, own, planted, quick, room, scatter};
+use crate::tests::{conditioned, entry, outside, own, planted, quick, scatter};
 use crate::weigh::weigh;
 
 use armcal_core::DwellId;
@@ -12,32 +12,32 @@ use nalgebra::DMatrix;
 use std::rc::Rc;
 
 /// A planted play in a room of its own.
-fn play() -> (Problem, Room) {
+fn play() -> (Problem, ConditionedProblem) {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
-    let room = Rc::try_unwrap(room(&p, &quick())).expect("nobody else has the room");
-    (p, room)
+    let conditioned = Rc::try_unwrap(conditioned(&p, &quick())).expect("nobody else has the room");
+    (p, conditioned)
 }
 
 /// The same, judged.
-fn judged() -> (Problem, Room, Judged) {
-    let (p, room) = play();
-    let judged = room.judge(entry(&room.weighed, "backlash:1"), &quick());
-    (p, room, judged)
+fn judged() -> (Problem, ConditionedProblem, Judged) {
+    let (p, conditioned) = play();
+    let judged = conditioned.judge(entry(&conditioned.weighed, "backlash:1"), &quick());
+    (p, conditioned, judged)
 }
 
 #[test]
 fn a_planted_play_is_judged_as_what_it_is() {
-    let (p, room, j) = judged();
+    let (p, conditioned, j) = judged();
     assert_eq!(j.grade(&quick()), Grade::Named);
     assert!(j.own().p_adjusted <= 0.01 && j.unlisted.as_ref().unwrap().above.nats < 0.0);
     assert!(j.places.after < 0.7 * j.places.before && j.places.p < 0.01);
     assert_eq!((j.places.groups, j.recordings.unwrap().groups), (33, 3));
     assert!(j.contrast.as_ref().unwrap().agrees);
     let columns = own(&p, "backlash:1").columns.dense(&p.dwells, 1.0);
-    let own = room.weighed.base.gram(&columns);
+    let own = conditioned.weighed.base.gram(&columns);
     assert!((&j.gram.a - own.a).amax() < 1e-9 && (&j.gram.g - own.g).amax() < 1e-9);
-    assert_eq!(j.significance.len(), room.weighed.entries.len());
-    assert_eq!(j.gain, room.score_with(&columns).above(room.nothing()));
+    assert_eq!(j.significance.len(), conditioned.weighed.entries.len());
+    assert_eq!(j.gain, conditioned.score_with(&columns).above(conditioned.nothing()));
     assert!(j.gain.is_clear(100.0), "{:?}", j.gain);
 }
 
@@ -45,7 +45,7 @@ fn a_planted_play_is_judged_as_what_it_is() {
 fn one_recording_has_no_recordings_to_leave_out() {
     let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
     p = p.without(&p.dwells.iter().map(|d| d.id.recording == 0).collect::<Vec<_>>());
-    assert!(room(&p, &quick()).judge(0, &quick()).recordings.is_none());
+    assert!(conditioned(&p, &quick()).judge(0, &quick()).recordings.is_none());
 }
 
 #[test]
@@ -80,8 +80,8 @@ fn what_is_real_needs_score_gate_and_left_out_errors() {
 
 #[test]
 fn what_is_judged_must_gain_the_margin_for_each_amplitude() {
-    let (_, room, j) = judged();
-    assert_eq!((j.cost_nats, room.weighed.amplitudes(j.entry)), (quick().margin_nats, 1));
+    let (_, conditioned, j) = judged();
+    assert_eq!((j.cost_nats, conditioned.weighed.amplitudes(j.entry)), (quick().margin_nats, 1));
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn too_few_clusters_are_dwells_by_themselves() {
 #[test]
 fn stretches_are_left_out_where_errors_are_like_those_before_them() {
     let p = planted(&[], 0, 1);
-    let fresh = || Rc::try_unwrap(room(&p, &quick())).expect("nobody else has the room");
+    let fresh = || Rc::try_unwrap(conditioned(&p, &quick())).expect("nobody else has the room");
     assert_eq!(fresh().exam().folds.len(), 33);
     let mut r = fresh();
     r.scatter = remembering();
@@ -161,9 +161,9 @@ fn stretches_are_left_out_where_errors_are_like_those_before_them() {
 #[test]
 fn what_is_not_listed_is_compared_by_its_score_and_known_by_its_shape() {
     let beside = |unlisted: &[(&str, f64)]| {
-        let (p, mut room) = play();
-        room.weighed.unlisted = unlisted.iter().map(|(s, ln)| outside(&p, s, true, *ln)).collect();
-        let judged = room.judge(entry(&room.weighed, "backlash:1"), &quick());
+        let (p, mut conditioned) = play();
+        conditioned.weighed.unlisted = unlisted.iter().map(|(s, ln)| outside(&p, s, true, *ln)).collect();
+        let judged = conditioned.judge(entry(&conditioned.weighed, "backlash:1"), &quick());
         (judged.grade(&quick()), judged.unlisted.clone(), judged.score)
     };
     assert!(beside(&[]).1.is_none());
@@ -222,7 +222,7 @@ fn the_geometry_alone_is_fitted_with_its_prior() {
 #[test]
 fn a_room_judges_an_entry_once() {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
-    let r = room(&p, &quick());
+    let r = conditioned(&p, &quick());
     let first = r.judge(0, &quick());
     // Another seed would draw other signs: what is known is told again.
     let again = r.judge(0, &DiagnosisConfig { seed: 7, ..quick() });

@@ -73,7 +73,7 @@ fn an_error_is_suspect_from_the_declared_rarity_on_whatever_the_noise() {
             push(&mut p, at, Vector3::new(0.0, 0.0, 0.1 * f64::from(tenths) * SIGMA_M));
             let p = overconfident(p, declared);
             let weighed = weigh(&p, &config());
-            let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| weighed.tamed(b.0, &p, &config()));
+            let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| weighed.regularised(b.0, &p, &config()));
             let alone: Vec<Group> = (0..p.dwells.len()).map(|i| vec![i].into()).collect();
             let left = left_out(&p, best.as_ref(), &alone, weighed.scale);
             let square = studentised(&p, &left, &left_out(&p, best.as_ref(), &[], weighed.scale));

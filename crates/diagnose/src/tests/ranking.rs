@@ -123,28 +123,28 @@ fn several_effects_have_a_row_for_each_that_could_stand_in_the_place_of_one() {
 fn shares_of_several_effects_multiply() {
     use crate::search::search;
     use crate::settle::{Scored, settle};
-    use crate::tests::{entry, in_rooms, room as first_room};
+    use crate::tests::{conditioned as first_room, entry, with_conditioned};
     let (p, config) = (planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3), quick());
     let base = first_room(&p, &config);
-    in_rooms(&p, &config, |rooms| {
-        let mut found = search(rooms, &[], &config).unwrap();
-        settle(&mut found, rooms, &config).unwrap();
+    with_conditioned(&p, &config, |conditioned_problems| {
+        let mut found = search(conditioned_problems, &[], &config).unwrap();
+        settle(&mut found, conditioned_problems, &config).unwrap();
         assert_eq!(found.accepted.len(), 2);
         let shares = [("backlash:3", 0.75, 0.2, 0.05), ("zero_drift:3", 0.5, 0.4, 0.1)];
         for (a, (other, own, share, nothing)) in found.accepted.iter_mut().zip(shares) {
             let score = a.judged.score.clone();
             a.judged.significance[a.judged.entry].p_adjusted = nothing;
-            let named = entry(&a.room.weighed, other);
+            let named = entry(&a.conditioned.weighed, other);
             a.judged.significance[named].p_adjusted = 0.01;
             let what = [
                 (Instead::Entry(a.judged.entry), own),
-                (Instead::Entry(entry(&a.room.weighed, other)), share),
+                (Instead::Entry(entry(&a.conditioned.weighed, other)), share),
                 (Instead::Nothing, nothing),
             ];
             a.ranked = what.map(|(what, weight)| Scored { what, score: score.clone(), weight }).to_vec();
         }
         let names: Vec<String> = found.accepted.iter().map(|a| a.candidate.spec.clone()).collect();
-        let ranking = Ranking::of_answer(&found.accepted, &base, rooms, &config);
+        let ranking = Ranking::of_answer(&found.accepted, &base, conditioned_problems, &config);
         let of = |first: &str, second: &str| {
             let row = ranking.explanations.iter().find(|e| e.effects == [first, second]).unwrap();
             row.standing.probability
@@ -159,7 +159,7 @@ fn shares_of_several_effects_multiply() {
         let [a, b] = &found.accepted[..] else { panic!("two") };
         let swapped = ranking.explanations.iter().find(|e| e.effects == ["backlash:3", &names[1]]).unwrap();
         let p = |a: &Accepted, k: usize| a.judged.significance[k].p_adjusted;
-        let of_other = p(a, entry(&a.room.weighed, "backlash:3"));
+        let of_other = p(a, entry(&a.conditioned.weighed, "backlash:3"));
         assert_eq!(swapped.p_adjusted, of_other.max(p(b, b.judged.entry)));
     });
 }
@@ -170,7 +170,7 @@ fn without_a_name_what_is_not_listed_has_its_share() {
     let poses = arm::design(0, &mut r);
     let (_, _, _, effect) = arm::outside(1.0).remove(0);
     let p = arm::problem(&poses, &[(effect, vec![])], arm::Noise::White, &mut r, false);
-    let ranking = Ranking::of_nothing(&crate::tests::room(&p, &quick()), &quick());
+    let ranking = Ranking::of_nothing(&crate::tests::conditioned(&p, &quick()), &quick());
     let listed: f64 = ranking.explanations.iter().map(|e| e.standing.probability).sum();
     assert!(ranking.p_unlisted > 0.9, "{}", ranking.p_unlisted);
     assert!((ranking.p_nothing + ranking.p_unlisted + listed - 1.0).abs() < 1e-9);

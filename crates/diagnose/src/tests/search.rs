@@ -7,7 +7,7 @@ use crate::LinearRefit;
 use crate::forward::tests::{beside, planted, strong, told};
 use crate::problem::{Columns, Problem};
 use crate::settle::settle;
-use crate::tests::{arm, in_rooms, own, quick};
+use crate::tests::{arm, own, quick, with_conditioned};
 use crate::weigh::weigh;
 use std::sync::Arc;
 
@@ -27,7 +27,10 @@ fn something_is_missing_where_an_explanation_predicts() {
 #[test]
 fn a_search_tells_names_curves_and_what_is_left() {
     let config = quick();
-    let searched = |p: &Problem| in_rooms(p, &config, |rooms| search(rooms, &[], &config)).unwrap();
+    let searched = |p: &Problem| {
+        with_conditioned(p, &config, |conditioned_problems| search(conditioned_problems, &[], &config))
+            .unwrap()
+    };
     let specs = |of: &[Accepted]| of.iter().map(|a| a.candidate.spec.clone()).collect::<Vec<_>>();
     let s = searched(&planted(&[], 0, 5));
     assert!(s.accepted.is_empty() && s.curves.is_empty() && !s.left_over && !s.may_be_shape);
@@ -46,7 +49,7 @@ fn a_search_tells_names_curves_and_what_is_left() {
     let curves: Vec<_> = s.curves.iter().map(|c| c.candidate.spec.as_str()).collect();
     assert_eq!(curves, ["joint3 <- q3"]);
     assert!(s.left_over && !s.may_be_shape);
-    let mean = |r: &Room| r.weighed.base.rss;
+    let mean = |r: &ConditionedProblem| r.weighed.base.rss;
     assert!(mean(&s.with_curves) < 0.7 * mean(&s.rest), "the curve is in the model");
 }
 
@@ -61,8 +64,9 @@ fn names_of_fewer_dwells_are_a_beginning_and_nothing_more() {
         let found = {
             let keep = vec![true; p.dwells.len()];
             let weighed = weigh(&p, &config);
-            let mut rooms = Rooms::new(&mut refit, keep, (p.clone(), weighed), &config);
-            search(&mut rooms, &proposed, &config).unwrap()
+            let mut conditioned_problems =
+                ConditionedProblems::new(&mut refit, keep, (p.clone(), weighed), &config);
+            search(&mut conditioned_problems, &proposed, &config).unwrap()
         };
         let mut names: Vec<String> = found.accepted.iter().map(|a| a.candidate.spec.clone()).collect();
         names.sort();
@@ -102,7 +106,8 @@ fn a_name_that_a_curve_explains_as_well_was_never_that_effect() {
     let poses = arm::design(0, &mut r);
     let bump = arm::on_joint(0, |p, _, _| 9e-3 * (-((p.q[0] - 0.05) / 0.05).powi(2)).exp());
     let p = arm::problem(&poses, &[(bump, vec![])], arm::Noise::White, &mut r, false);
-    let s = in_rooms(&p, &config, |rooms| search(rooms, &[], &config)).unwrap();
+    let s = with_conditioned(&p, &config, |conditioned_problems| search(conditioned_problems, &[], &config))
+        .unwrap();
     assert!(s.accepted.is_empty(), "{:?}", s.accepted.iter().map(|a| &a.candidate.spec).collect::<Vec<_>>());
     assert_eq!(s.curves[0].candidate.spec, "joint1 <- q1");
 }
@@ -117,13 +122,13 @@ fn of_names_that_the_data_leave_the_known_one_is_told() {
     let twin = Candidate { spec: "twin".into(), family: "twin".into(), columns, ..a };
     p.candidates.push(twin);
     let told = |p: &Problem| {
-        let s = in_rooms(p, &config, |rooms| {
-            let mut s = search(rooms, &[], &config)?;
-            settle(&mut s, rooms, &config)?;
+        let s = with_conditioned(p, &config, |conditioned_problems| {
+            let mut s = search(conditioned_problems, &[], &config)?;
+            settle(&mut s, conditioned_problems, &config)?;
             Ok::<_, DiagnoseError>(s)
         });
         let [one] = &s.unwrap().accepted[..] else { panic!("one effect was planted") };
-        let name = |k: &usize| one.room.weighed.entries[*k].candidate.spec.clone();
+        let name = |k: &usize| one.conditioned.weighed.entries[*k].candidate.spec.clone();
         let set: Vec<String> = one.set.iter().map(name).collect();
         (one.candidate.spec.clone(), set, one.instead_of.clone())
     };
@@ -143,14 +148,16 @@ fn of_names_that_the_data_leave_the_known_one_is_told() {
 fn what_shows_only_beside_an_unlisted_shape_is_tentative() {
     let config = quick();
     let p = beside("bump", "backlash:3", 0.4);
-    let s = in_rooms(&p, &config, |rooms| search(rooms, &[], &config)).unwrap();
+    let s = with_conditioned(&p, &config, |conditioned_problems| search(conditioned_problems, &[], &config))
+        .unwrap();
     let curves: Vec<_> = s.curves.iter().map(|c| c.candidate.spec.as_str()).collect();
     let tentative: Vec<_> = s.tentative.iter().map(|t| t.candidate.spec.as_str()).collect();
     assert_eq!((curves, tentative), (vec!["joint1 <- q1"], vec!["backlash:3"]));
     assert!(s.accepted.is_empty() && s.left_over);
     // Where no joint errs over its own angle the best cell stands for what is not listed.
     let p = beside("crossed", "zero_drift:1", 0.4);
-    let s = in_rooms(&p, &config, |rooms| search(rooms, &[], &config)).unwrap();
+    let s = with_conditioned(&p, &config, |conditioned_problems| search(conditioned_problems, &[], &config))
+        .unwrap();
     let tentative: Vec<_> = s.tentative.iter().map(|t| t.candidate.spec.as_str()).collect();
     assert_eq!((s.curves.len(), tentative), (0, vec!["zero_drift:1"]));
 }
@@ -161,12 +168,14 @@ fn a_name_falls_to_a_curve_that_says_the_same_and_to_no_other() {
     let config = quick();
     let beside = |spec: &str| {
         let curve = Candidate { spec: "curve".into(), family: "unlisted".into(), ..own(&p, spec) };
-        in_rooms(&p, &config, |rooms| {
+        with_conditioned(&p, &config, |conditioned_problems| {
             let steps = strong(&p, &["backlash:1", "zero_drift:2"]);
-            let accepted = confirm(rooms, steps, &[], &config).unwrap();
-            let rest = rooms.with(&named(&accepted)).unwrap();
-            let kept = beside_curves(rooms, accepted, &[curve], &rest, &config).unwrap();
-            kept.into_iter().map(|a| (a.candidate.spec, a.room.problem.geometry.ncols())).collect::<Vec<_>>()
+            let accepted = confirm(conditioned_problems, steps, &[], &config).unwrap();
+            let rest = conditioned_problems.with(&named(&accepted)).unwrap();
+            let kept = beside_curves(conditioned_problems, accepted, &[curve], &rest, &config).unwrap();
+            kept.into_iter()
+                .map(|a| (a.candidate.spec, a.conditioned.problem.geometry.ncols()))
+                .collect::<Vec<_>>()
         })
     };
     // What stays is judged without the curve again: 21 columns of geometry, and the other effect where there is one.
@@ -185,11 +194,11 @@ fn a_curve_that_joined_leaves_little_of_its_own_evidence_whatever_the_noise() {
     let sound = arm::problem(&poses, &[(curve, vec![])], arm::Noise::White, &mut r, false);
     for declared in [1.0, 15.0] {
         let p = arm::overconfident(sound.clone(), declared);
-        in_rooms(&p, &config, |rooms| {
-            let bare = rooms.with(&[]).unwrap();
+        with_conditioned(&p, &config, |conditioned_problems| {
+            let bare = conditioned_problems.with(&[]).unwrap();
             let cell = bare.weighed.best_cell().unwrap();
             assert_eq!(cell.what.name, "joint3 <- q3");
-            let with = rooms.with(&[as_candidate(&cell.what, &bare, &config)]).unwrap();
+            let with = conditioned_problems.with(&[as_candidate(&cell.what, &bare, &config)]).unwrap();
             let own = with.weighed.unlisted.iter().filter(|u| u.what.name == cell.what.name);
             let left = own.map(|u| u.ln_evidence).fold(0.0, f64::max);
             assert!(left < 0.2 * cell.ln_evidence, "{declared}: {left} of {}", cell.ln_evidence);

@@ -5,12 +5,12 @@
 use super::*;
 use crate::problem::{Columns, Problem};
 use crate::search::search;
-use crate::tests::{in_rooms, own, planted, quick};
+use crate::tests::{own, planted, quick, with_conditioned};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
 fn spec(found: &Accepted, k: usize) -> &str {
-    &found.room.weighed.entries[k].candidate.spec
+    &found.conditioned.weighed.entries[k].candidate.spec
 }
 
 fn set(found: &Accepted) -> Vec<&str> {
@@ -18,12 +18,12 @@ fn set(found: &Accepted) -> Vec<&str> {
 }
 
 /// What is found in a problem, settled, and something asked of it.
-fn asked<T>(p: &Problem, ask: impl FnOnce(&Search, &mut Rooms<'_>) -> T) -> T {
+fn asked<T>(p: &Problem, ask: impl FnOnce(&Search, &mut ConditionedProblems<'_>) -> T) -> T {
     let config = quick();
-    in_rooms(p, &config, |rooms| {
-        let mut found = search(rooms, &[], &config).unwrap();
-        settle(&mut found, rooms, &config).unwrap();
-        ask(&found, rooms)
+    with_conditioned(p, &config, |conditioned_problems| {
+        let mut found = search(conditioned_problems, &[], &config).unwrap();
+        settle(&mut found, conditioned_problems, &config).unwrap();
+        ask(&found, conditioned_problems)
     })
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn cases() -> Vec<(Problem, Vec<&'static str>)> {
 fn a_set_holds_what_was_planted_and_nothing_that_is_clearly_worse() {
     let config = quick();
     for (p, names) in cases() {
-        asked(&p, |found, rooms| {
+        asked(&p, |found, conditioned_problems| {
             assert_eq!(found.accepted.len(), names.len(), "{names:?}");
             for name in &names {
                 let holds = found.accepted.iter().any(|a| set(a).contains(name));
@@ -62,8 +62,8 @@ fn a_set_holds_what_was_planted_and_nothing_that_is_clearly_worse() {
                 let others = || found.accepted.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, a)| a);
                 let mut refit = |k: usize| {
                     let mut with: Vec<Candidate> = others().map(|a| a.candidate.clone()).collect();
-                    with.push(a.room.weighed.entries[k].candidate.clone());
-                    rooms.score(&with, &a.room).unwrap()
+                    with.push(a.conditioned.weighed.entries[k].candidate.clone());
+                    conditioned_problems.score(&with, &a.conditioned).unwrap()
                 };
                 let ranked: Vec<(usize, Score)> = (a.ranked.iter())
                     .filter_map(|s| if let Instead::Entry(k) = s.what { Some((k, refit(k))) } else { None })
@@ -116,10 +116,10 @@ fn halved() -> Problem {
 
 /// What was found, by another name of its room.
 fn renamed(found: &Accepted, name: &str) -> Accepted {
-    let room = found.room.clone();
-    let entry = crate::tests::entry(&room.weighed, name);
-    let candidate = room.weighed.entries[entry].candidate.clone();
-    let judged = room.judge(entry, &quick());
+    let conditioned = found.conditioned.clone();
+    let entry = crate::tests::entry(&conditioned.weighed, name);
+    let candidate = conditioned.weighed.entries[entry].candidate.clone();
+    let judged = conditioned.judge(entry, &quick());
     Accepted { candidate, judged, set: vec![entry], ..found.clone() }
 }
 
@@ -151,15 +151,15 @@ fn the_same_columns_are_a_tie_and_fewer_amplitudes_come_first() {
 fn what_remains_is_what_the_settled_names_leave() {
     let config = quick();
     let p = halved();
-    in_rooms(&p, &config, |rooms| {
-        let mut found = search(rooms, &[], &config).unwrap();
+    with_conditioned(&p, &config, |conditioned_problems| {
+        let mut found = search(conditioned_problems, &[], &config).unwrap();
         let twin = renamed(&found.accepted[0], "twin");
-        found.rest = rooms.with(std::slice::from_ref(&twin.candidate)).unwrap();
+        found.rest = conditioned_problems.with(std::slice::from_ref(&twin.candidate)).unwrap();
         found.accepted[0] = twin;
         let offers =
             |found: &Search, name: &str| found.rest.weighed.entries.iter().any(|e| e.candidate.spec == name);
         assert!(offers(&found, "backlash:1"));
-        settle(&mut found, rooms, &config).unwrap();
+        settle(&mut found, conditioned_problems, &config).unwrap();
         assert_eq!(found.accepted[0].candidate.spec, "backlash:1", "the simpler of the two");
         assert!(!offers(&found, "backlash:1"), "the room that was settled in has it in its base");
     });
@@ -170,21 +170,21 @@ fn within_a_standard_error_the_simplest_comes_first_and_beyond_it_what_says_more
     let config = quick();
     // The twin, entry 0, has two amplitudes; every other name has one.
     let p = with_twin(|a, _| DMatrix::from_columns(&[1.0 * a.column(0), 0.5 * a.column(0)]));
-    let room = crate::tests::room(&p, &config);
-    let (twin, simple) = (0, crate::tests::entry(&room.weighed, "backlash:1"));
+    let conditioned = crate::tests::conditioned(&p, &config);
+    let (twin, simple) = (0, crate::tests::entry(&conditioned.weighed, "backlash:1"));
     // Four groups: 8 nats more, 5 of worth, each group 2 +- scatter.
     let of = |each: [f64; 4]| crate::score::tests::score(&each);
     for (scattered, first) in [([6.0, -2.0, 6.0, -2.0], simple), ([2.1, 1.9, 2.1, 1.9], twin)] {
         let members = [(twin, of(scattered)), (simple, of([0.0; 4]))];
-        let set = simplest_first(members.iter().collect(), room.costs(&config));
+        let set = simplest_first(members.iter().collect(), conditioned.costs(&config));
         assert_eq!(set.first(), Some(&first), "{scattered:?}");
     }
     // Eight nats more less three for the amplitude, and a standard error of six.
     let members = [(twin, of([4.6, -0.6, 4.6, -0.6])), (simple, of([0.0; 4]))];
-    assert_eq!(simplest_first(members.iter().collect(), room.costs(&config)), [simple, twin]);
+    assert_eq!(simplest_first(members.iter().collect(), conditioned.costs(&config)), [simple, twin]);
     // What is worth most and simplest is so too where it says less.
     let members = [(simple, of([0.0; 4])), (twin, of([0.25; 4]))];
-    assert_eq!(simplest_first(members.iter().collect(), room.costs(&config)), [simple, twin]);
+    assert_eq!(simplest_first(members.iter().collect(), conditioned.costs(&config)), [simple, twin]);
 }
 
 #[test]
@@ -229,18 +229,22 @@ fn settled_where(own: [f64; 4], unlisted: [f64; 4], cosine: f64) -> Option<Accep
     let config = quick();
     let score = |each: &[f64; 4]| Some(crate::score::tests::score(each));
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
-    in_rooms(&p, &config, |rooms| {
-        let mut found = search(rooms, &[], &config).unwrap().accepted[0].clone();
-        let room = found.room.clone();
-        for k in near(&found, &room, &config) {
+    with_conditioned(&p, &config, |conditioned_problems| {
+        let mut found = search(conditioned_problems, &[], &config).unwrap().accepted[0].clone();
+        let conditioned = found.conditioned.clone();
+        for k in near(&found, &conditioned, &config) {
             let each = if k == found.judged.entry { own } else { [0.0; 4] };
-            rooms.suppose(std::slice::from_ref(&room.weighed.entries[k].candidate), &room, score(&each));
+            conditioned_problems.suppose(
+                std::slice::from_ref(&conditioned.weighed.entries[k].candidate),
+                &conditioned,
+                score(&each),
+            );
         }
-        rooms.suppose(&[], &room, score(&[0.0; 4]));
+        conditioned_problems.suppose(&[], &conditioned, score(&[0.0; 4]));
         let (of_unlisted, of_name) = (score(&unlisted).unwrap(), score(&own).unwrap());
         let above = of_unlisted.above(&of_name);
         found.judged.unlisted = Some(crate::judge::Unlisted { score: of_unlisted, above, cosine });
-        settled(&found, &[], rooms, &config)
+        settled(&found, &[], conditioned_problems, &config)
     })
 }
 
@@ -276,20 +280,21 @@ fn a_name_falls_where_its_refit_says_no_more_than_nothing() {
 fn answered(p: &Problem, said: &[(&str, f64)], acts: &[&str]) -> (Vec<String>, Vec<String>) {
     let config = quick();
     let each = |nats: f64| crate::score::tests::score(&[nats, nats + 0.01, nats, nats + 0.01]);
-    in_rooms(p, &config, |rooms| {
-        let found = search(rooms, &[], &config).unwrap().accepted[0].clone();
-        let mut room = (*found.room).clone();
-        let at = |room: &Room, spec: &str| crate::tests::entry(&room.weighed, spec);
+    with_conditioned(p, &config, |conditioned_problems| {
+        let found = search(conditioned_problems, &[], &config).unwrap().accepted[0].clone();
+        let mut conditioned = (*found.conditioned).clone();
+        let at =
+            |conditioned: &ConditionedProblem, spec: &str| crate::tests::entry(&conditioned.weighed, spec);
         for spec in acts {
-            let k = at(&room, spec);
-            room.weighed.entries[k].candidate.known = Some("it was seen".into());
+            let k = at(&conditioned, spec);
+            conditioned.weighed.entries[k].candidate.known = Some("it was seen".into());
         }
-        let own = at(&room, "backlash:1");
-        let found = Accepted { judged: room.judge(own, &config), ..found };
+        let own = at(&conditioned, "backlash:1");
+        let found = Accepted { judged: conditioned.judge(own, &config), ..found };
         let refits: Vec<(usize, Score)> =
-            said.iter().map(|(spec, nats)| (at(&room, spec), each(*nats))).collect();
-        let (set, left_out) = answer(&found, &refits, &each(0.0), &room, &config);
-        (set.into_iter().map(|k| room.weighed.entries[k].candidate.spec.clone()).collect(), left_out)
+            said.iter().map(|(spec, nats)| (at(&conditioned, spec), each(*nats))).collect();
+        let (set, left_out) = answer(&found, &refits, &each(0.0), &conditioned, &config);
+        (set.into_iter().map(|k| conditioned.weighed.entries[k].candidate.spec.clone()).collect(), left_out)
     })
 }
 
@@ -335,20 +340,20 @@ fn near_a_play(p: &Problem, gain: f64, more: &[(&str, f64)]) -> Vec<String> {
     let score = |nats: f64| {
         crate::score::tests::score(&[nats / 4.0 + 0.01, nats / 4.0, nats / 4.0 - 0.01, nats / 4.0])
     };
-    in_rooms(p, &config, |rooms| {
-        let mut found = search(rooms, &[], &config).unwrap().accepted[0].clone();
-        let room = found.room.clone();
-        let own = crate::tests::entry(&room.weighed, "backlash:1");
-        (0..room.weighed.entries.len()).for_each(|k| room.suppose(k, score(-100.0)));
+    with_conditioned(p, &config, |conditioned_problems| {
+        let mut found = search(conditioned_problems, &[], &config).unwrap().accepted[0].clone();
+        let conditioned = found.conditioned.clone();
+        let own = crate::tests::entry(&conditioned.weighed, "backlash:1");
+        (0..conditioned.weighed.entries.len()).for_each(|k| conditioned.suppose(k, score(-100.0)));
         for (spec, nats) in more {
-            room.suppose(crate::tests::entry(&room.weighed, spec), score(gain + nats));
+            conditioned.suppose(crate::tests::entry(&conditioned.weighed, spec), score(gain + nats));
         }
-        found.judged = room.judge(own, &config);
+        found.judged = conditioned.judge(own, &config);
         found.judged.score = score(gain);
         found.judged.gain = found.judged.score.above(&score(0.0));
-        near(&found, &room, &config)
+        near(&found, &conditioned, &config)
             .into_iter()
-            .map(|k| room.weighed.entries[k].candidate.spec.clone())
+            .map(|k| conditioned.weighed.entries[k].candidate.spec.clone())
             .collect()
     })
 }
@@ -370,20 +375,24 @@ fn a_name_and_what_one_step_puts_near_the_best_are_refitted() {
 fn names_that_change_are_confirmed_beside_each_other() {
     let config = quick();
     let p = halved();
-    in_rooms(&p, &config, |rooms| {
-        let mut found = search(rooms, &[], &config).unwrap();
-        let room = found.accepted[0].room.clone();
+    with_conditioned(&p, &config, |conditioned_problems| {
+        let mut found = search(conditioned_problems, &[], &config).unwrap();
+        let conditioned = found.accepted[0].conditioned.clone();
         let of = |spec: &str| renamed(&found.accepted[0], spec);
         // What is not there, beside a name that will change: its refits are supposed to stand.
         let (twin, none) = (of("twin"), of("zero_drift:2"));
         let score = |nats: f64| Some(crate::score::tests::score(&[nats, nats + 0.1, nats, nats]));
-        rooms.suppose(std::slice::from_ref(&twin.candidate), &room, score(0.0));
-        rooms.suppose(std::slice::from_ref(&none.candidate), &room, score(0.0));
+        conditioned_problems.suppose(std::slice::from_ref(&twin.candidate), &conditioned, score(0.0));
+        conditioned_problems.suppose(std::slice::from_ref(&none.candidate), &conditioned, score(0.0));
         for other in ["twin", "backlash:1"] {
-            rooms.suppose(&[of(other).candidate, none.candidate.clone()], &room, score(100.0));
+            conditioned_problems.suppose(
+                &[of(other).candidate, none.candidate.clone()],
+                &conditioned,
+                score(100.0),
+            );
         }
         found.accepted = vec![twin, none];
-        names_settled(&mut found, rooms, &config).unwrap();
+        names_settled(&mut found, conditioned_problems, &config).unwrap();
         assert_eq!(specs(&found.accepted), ["backlash:1"]);
     });
 }

@@ -6,14 +6,14 @@
 
 use super::LeftOut;
 use crate::error::HeldOutError;
-use crate::past::{lasts, place_arms};
+use crate::stored::{lasts, place_arms};
 use armcal_calibrate::{HeldOut, HoldoutConfig, calibrate, compare_errors, mean_by_dwell};
 use armcal_config::Pipeline;
 use armcal_core::{DwellId, Warning};
 use armcal_model::EffectSpec;
-use armcal_pipeline::Settled;
-use armcal_result::PastArms;
-use armcal_stages::{Fitted, Steps, frames, perceive, with_effects};
+use armcal_pipeline::Converged;
+use armcal_result::StoredArms;
+use armcal_stages::{Fitted, Steps, frames, preprocess, with_effects};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -88,7 +88,7 @@ pub fn between(asked: &Asked<'_>, progress: &dyn Steps) -> Result<SessionTransfe
     let judge = sound(&to, progress)?;
     let seen = taught.inputs.seen.iter().chain(&judge.inputs.seen);
     let fingerprints: Vec<_> = seen.map(|s| (s.name.as_str(), s.fingerprint.as_ref())).collect();
-    perceive::refuse_repeated(&fingerprints)?;
+    preprocess::refuse_repeated(&fingerprints)?;
 
     let (effects, left_behind) = effects(named, &from, &taught, progress)?;
     progress.step(&format!("judging {} in {}", from.name, to.name));
@@ -124,7 +124,7 @@ pub fn between(asked: &Asked<'_>, progress: &dyn Steps) -> Result<SessionTransfe
 }
 
 /// A session without a mistake in its setup: of another, every sentence would be about the mistake.
-fn sound(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, HeldOutError> {
+fn sound(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Converged, HeldOutError> {
     let settled = armcal_pipeline::settle(pipeline, progress)?;
     settled.refuse_mistakes()?;
     Ok(settled)
@@ -134,7 +134,7 @@ fn sound(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, HeldOutEr
 fn effects(
     named: Vec<EffectSpec>,
     from: &Pipeline,
-    taught: &Settled,
+    taught: &Converged,
     progress: &dyn Steps,
 ) -> Result<(Vec<EffectSpec>, Vec<LeftOut>), HeldOutError> {
     let geometry = &taught.fitted.geometry;
@@ -181,7 +181,7 @@ impl Carrier<'_> {
         let Fitted { geometry, observations, session, .. } = self.taught;
         let model = with_effects(self.from, geometry, effects, observations)?;
         let calibration = calibrate(&model, observations, &self.from.fit, &HoldoutConfig::None)?;
-        let then = PastArms {
+        let then = StoredArms {
             geometry: geometry.clone(),
             nominal_values: calibration.nominal_values[..geometry.parameters().len()].to_vec(),
             values: calibration.fit.values(),

@@ -10,7 +10,7 @@ use armcal_core::{Dwell, DwellId, Observation, Reference, Samples};
 use armcal_iso9283::{Evidence, PathTest, Settings, TimedPose, TipPose, Visit, assess};
 use armcal_result::IsoReport;
 use armcal_stages::{Placed, PlacedBase};
-use armcal_stages::{Seen, observe};
+use armcal_stages::{RecordingData, observe};
 use armcal_verify::{PathError, Planned, Polyline};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -32,7 +32,7 @@ const APPROACH_M: f64 = 2e-3;
 pub struct Shown<'a> {
     pub placed: &'a Placed,
     pub base: PlacedBase<'a>,
-    pub seen: &'a [Seen],
+    pub seen: &'a [RecordingData],
     pub samples: &'a [Samples],
     pub motions: &'a [Motion],
 }

@@ -1,6 +1,6 @@
 //! `armcal verify`: what a calibrated model is worth on recordings that its calibration never saw.
 //!
-//! `PastModel -> placed among the new recordings' frames -> points (dwells) + motion (everything between) -> Verification`
+//! `StoredModel -> placed among the new recordings' frames -> points (dwells) + motion (everything between) -> Verification`
 
 mod iso;
 mod motion;
@@ -9,15 +9,15 @@ mod point;
 mod told;
 
 use crate::error::HeldOutError;
-use crate::past::place;
+use crate::stored::place;
 use armcal_config::{BoardPose, Pipeline};
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
-use armcal_result::{Closing, PastModel, open_model};
+use armcal_result::{Closing, StoredModel, open_model};
 use armcal_result::{PathSample, Verification, VerifiedRecording};
 use armcal_stages::associated::Associated;
 use armcal_stages::measures::Measures;
-use armcal_stages::{Placed, RunError, Seen, Steps, frames, observe, perceive};
+use armcal_stages::{Placed, RecordingData, RunError, Steps, frames, observe, preprocess};
 use armcal_table::{Association, Board};
 use armcal_verify::{ClockError, PathRow};
 use motion::{Judge, Motion};
@@ -38,9 +38,9 @@ pub fn verify(
     let past = open_model(result)?;
     let (_, chain) = frames::nominal_chain(pipeline)?;
     let board = frames::board(pipeline)?;
-    let recordings = perceive::open_all(pipeline, progress)?;
+    let recordings = preprocess::open_all(pipeline, progress)?;
     let mut samples = Vec::new();
-    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |s| samples.push(s))?;
+    let seen = preprocess::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |s| samples.push(s))?;
     progress.step("comparing");
     let Distinct { pipeline, seen, samples, warnings: once } = once::distinct(pipeline, seen, samples);
     let pipeline = &pipeline;
@@ -88,7 +88,7 @@ pub fn verify(
     })
 }
 
-fn recording(seen: &Seen, motion: &Motion) -> VerifiedRecording {
+fn recording(seen: &RecordingData, motion: &Motion) -> VerifiedRecording {
     VerifiedRecording {
         name: seen.name.clone(),
         dwells: seen.dwells.len(),
@@ -111,7 +111,7 @@ fn rows(motions: Vec<Motion>, names: &[String]) -> Vec<PathRow> {
 }
 
 /// Warnings of a recording, with its name.
-fn of_recording(seen: &Seen) -> Vec<Warning> {
+fn of_recording(seen: &RecordingData) -> Vec<Warning> {
     let named = |w: &Warning| {
         let subject = format!("{}: {}", seen.name, w.subject);
         // Dwell detection knows the nominal arm only, whose errors look like those of a clock.
@@ -130,11 +130,11 @@ fn of_recording(seen: &Seen) -> Vec<Warning> {
 /// The new recordings, and what is put among them.
 struct Surroundings<'a> {
     result: &'a Path,
-    past: &'a PastModel,
+    past: &'a StoredModel,
     pipeline: &'a Pipeline,
     chain: &'a Chain,
     board: Option<&'a Board>,
-    seen: &'a [Seen],
+    seen: &'a [RecordingData],
 }
 
 impl Surroundings<'_> {

@@ -3,10 +3,10 @@
 use crate::error::HeldOutError;
 use armcal_config::Pipeline;
 use armcal_core::{DwellId, JointSamples, Observation, Samples};
-use armcal_dwell::{ClockAlignment, Moment, track};
+use armcal_dwell::{ClockAlignment, TrackSample, track};
 use armcal_stages::observe;
 use armcal_stages::{Placed, PlacedBase};
-use armcal_stages::{RunError, Seen};
+use armcal_stages::{RecordingData, RunError};
 use armcal_verify::{ClockError, Lateness, Passing, PathError, Planned, Polyline, lateness, stretch};
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
@@ -47,7 +47,12 @@ impl<'a> Judge<'a> {
     /// Dwells need the sensor's clock to a tenth of a second, paths to a millisecond: an arm with play lags behind its
     /// encoders, and the alignment of the nominal arm takes that for a late clock. So the clock is found again, by the
     /// calibrated model.
-    pub fn follow(&self, recording: usize, seen: &Seen, samples: &Samples) -> Result<Motion, HeldOutError> {
+    pub fn follow(
+        &self,
+        recording: usize,
+        seen: &RecordingData,
+        samples: &Samples,
+    ) -> Result<Motion, HeldOutError> {
         let one = Recorded { recording, seen, samples, dwell: &self.pipeline.dwell };
         let (mut clock, mut moments) = (seen.clock.clone(), one.moments(seen.clock.as_ref())?);
         for _ in 0..CLOCK_ROUNDS {
@@ -74,7 +79,12 @@ impl<'a> Judge<'a> {
         Ok(Motion { errors, planned, clock, clock_error })
     }
 
-    fn lateness(&self, one: &Recorded<'_>, clock: &ClockAlignment, moments: &[Moment]) -> Option<Lateness> {
+    fn lateness(
+        &self,
+        one: &Recorded<'_>,
+        clock: &ClockAlignment,
+        moments: &[TrackSample],
+    ) -> Option<Lateness> {
         let (model, p) = (&self.placed.model, &self.placed.calibrated);
         let seen: Vec<(String, f64, Vector3<f64>, Vector3<f64>)> = moments
             .par_iter()
@@ -104,8 +114,8 @@ impl<'a> Judge<'a> {
         lateness(&passings)
     }
 
-    fn errors(&self, one: &Recorded<'_>, moments: &[Moment]) -> Vec<PathError> {
-        let error = |(index, m): (usize, &Moment)| {
+    fn errors(&self, one: &Recorded<'_>, moments: &[TrackSample]) -> Vec<PathError> {
+        let error = |(index, m): (usize, &TrackSample)| {
             let o = one.observation(self.pipeline, index, m);
             PathError {
                 motion: one.motion(m),
@@ -119,7 +129,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The path of each motion as its set-points command it; the joints arrive as they do in fact.
-    fn planned(&self, one: &Recorded<'_>, moments: &[Moment]) -> BTreeMap<DwellId, Planned> {
+    fn planned(&self, one: &Recorded<'_>, moments: &[TrackSample]) -> BTreeMap<DwellId, Planned> {
         let Some(asked) = &one.samples.set_points else { return BTreeMap::new() };
         let mut ways: BTreeMap<DwellId, [Vec<Vector3<f64>>; 2]> = BTreeMap::new();
         for (index, m) in moments.iter().enumerate() {
@@ -139,24 +149,24 @@ impl<'a> Judge<'a> {
 /// One recording with its samples.
 struct Recorded<'a> {
     recording: usize,
-    seen: &'a Seen,
+    seen: &'a RecordingData,
     samples: &'a Samples,
     dwell: &'a armcal_dwell::DwellConfig,
 }
 
 impl Recorded<'_> {
     /// Frames of the moving tip by this clock.
-    fn moments(&self, clock: Option<&ClockAlignment>) -> Result<Vec<Moment>, HeldOutError> {
-        let Seen { name, dwells, .. } = self.seen;
+    fn moments(&self, clock: Option<&ClockAlignment>) -> Result<Vec<TrackSample>, HeldOutError> {
+        let RecordingData { name, dwells, .. } = self.seen;
         let moments = track(self.samples, clock, dwells, self.dwell);
         Ok(moments.map_err(|source| RunError::Dwell { recording: name.clone(), source })?)
     }
 
-    fn observation(&self, pipeline: &Pipeline, index: usize, m: &Moment) -> Observation {
+    fn observation(&self, pipeline: &Pipeline, index: usize, m: &TrackSample) -> Observation {
         observe::moving(pipeline, self.recording, index, self.seen, m)
     }
 
-    fn motion(&self, m: &Moment) -> DwellId {
+    fn motion(&self, m: &TrackSample) -> DwellId {
         DwellId { recording: self.recording, dwell: m.motion }
     }
 }

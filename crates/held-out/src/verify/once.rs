@@ -3,15 +3,15 @@
 use armcal_config::Pipeline;
 use armcal_core::{JointSamples, Samples, Severity, Stage, Warning};
 use armcal_recording::{Fingerprint, SharedTime};
-use armcal_stages::Seen;
-use armcal_stages::perceive::repeats;
+use armcal_stages::RecordingData;
+use armcal_stages::preprocess::repeats;
 
 /// New recordings, each with its samples; no time is in two of them.
 pub struct Distinct {
     /// The pipeline on the recordings that are left.
     pub pipeline: Pipeline,
     /// What each showed.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<RecordingData>,
     /// What each holds.
     pub samples: Vec<Samples>,
     /// What was left out.
@@ -19,7 +19,7 @@ pub struct Distinct {
 }
 
 /// Leaves out of every recording what an earlier one holds: dwells and readings of the common time, or all of it.
-pub fn distinct(pipeline: &Pipeline, mut seen: Vec<Seen>, mut samples: Vec<Samples>) -> Distinct {
+pub fn distinct(pipeline: &Pipeline, mut seen: Vec<RecordingData>, mut samples: Vec<Samples>) -> Distinct {
     let fingerprints: Vec<&Fingerprint> = seen.iter().map(|s| s.fingerprint.as_ref()).collect();
     let mut warnings = Vec::new();
     for repeat in repeats(&fingerprints) {

@@ -4,13 +4,13 @@ use armcal_core::{DwellId, Observation, Samples, Severity, Stage, Unit, Visited,
 use armcal_model::{Chain, Model, PlacedEffect};
 use armcal_recording::{FileReport, sha256_of};
 use armcal_result::Told;
-use armcal_result::{DwellMark, PastModel, also_in};
-use armcal_stages::Seen;
+use armcal_result::{DwellMark, StoredModel, also_in};
+use armcal_stages::RecordingData;
 use std::collections::BTreeMap;
 
 /// The recordings that the calibration saw: the same files, or, re-encoded or cut, the same dwells.
-pub fn told(past: &PastModel, seen: &[Seen]) -> Vec<Told> {
-    let of = |s: &Seen| {
+pub fn told(past: &StoredModel, seen: &[RecordingData]) -> Vec<Told> {
+    let of = |s: &RecordingData| {
         let marks: Vec<DwellMark> =
             s.dwells.iter().map(|d| DwellMark::of(d.mid_ns(), &d.joint_rad)).collect();
         let known = |identity: &String| past.recordings.iter().any(|r| r.identity.contains(identity));

@@ -14,7 +14,7 @@ pub struct AxisTilt {
 }
 
 impl Mechanism for AxisTilt {
-    fn reshape_arm(&self, _now: &Moment<'_>, arm: &mut AxisArm) {
+    fn reshape_arm(&self, _now: &RigState<'_>, arm: &mut AxisArm) {
         let before = self.joint - 2;
         let across = arm.axes[before].direction.cross(&arm.link_m(before));
         if let Some(direction) = across.try_normalize(1e-9) {

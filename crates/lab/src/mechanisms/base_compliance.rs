@@ -13,7 +13,7 @@ pub struct BaseCompliance {
 
 impl BaseCompliance {
     /// How far the plate rocks, as a rotation vector in the base frame [rad].
-    pub(super) fn rock_rad(&self, now: &Moment<'_>) -> Vector3<f64> {
+    pub(super) fn rock_rad(&self, now: &RigState<'_>) -> Vector3<f64> {
         let last = now.arm.joint_count() - 1;
         let centres = now.arm.mass_centres_m.iter().enumerate();
         let mut moment: Vector3<f64> = centres
@@ -28,7 +28,7 @@ impl BaseCompliance {
 }
 
 impl Mechanism for BaseCompliance {
-    fn move_base(&self, now: &Moment<'_>, world_from_base: &mut Pose) {
+    fn move_base(&self, now: &RigState<'_>, world_from_base: &mut Pose) {
         let rock = self.rock_rad(now);
         if rock.norm() > 0.0 {
             *world_from_base *= UnitQuaternion::from_scaled_axis(rock);

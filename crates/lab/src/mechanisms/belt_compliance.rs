@@ -20,7 +20,7 @@ pub struct BeltCompliance {
 }
 
 impl BeltCompliance {
-    fn deflections_rad(&self, now: &Moment<'_>) -> [f64; 2] {
+    fn deflections_rad(&self, now: &RigState<'_>) -> [f64; 2] {
         let [upper_nm, fore_nm] = [now.gravity_nm[self.joint - 1], now.gravity_nm[self.joint]];
         let upper = (upper_nm - fore_nm) / self.stiffness_nm_rad;
         let fore = self.belt_stiffness_nm_rad.map_or(0.0, |stiffness| fore_nm / stiffness);
@@ -30,12 +30,12 @@ impl BeltCompliance {
 }
 
 impl Mechanism for BeltCompliance {
-    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn motor_to_link(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         let deflections = self.deflections_rad(now);
         joint_rad[self.joint - 1..].iter_mut().zip(deflections).for_each(|(q, x)| *q += x);
     }
 
-    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn link_to_motor(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         let deflections = self.deflections_rad(now);
         joint_rad[self.joint - 1..].iter_mut().zip(deflections).for_each(|(q, x)| *q -= x);
     }

@@ -26,7 +26,7 @@ fn two() -> usize {
 }
 
 impl Mechanism for BeltCoupling {
-    fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
+    fn ahead(&mut self, _now: &RigState<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
         Some((self.joint, joint_rad[self.by - 1] * self.share_percent / 100.0))
     }
 }

@@ -56,14 +56,14 @@ impl Bump {
     }
 
     /// Whether it has happened to `body`; a bump of no size never does.
-    fn hit(&self, now: &Moment<'_>, body: BumpedBody) -> bool {
+    fn hit(&self, now: &RigState<'_>, body: BumpedBody) -> bool {
         let moved = self.shift_mm.iter().chain(&self.turn_deg).any(|v| *v != 0.0);
         moved && self.body == body && happened(now, self.recording, self.at_s, self.until_s)
     }
 }
 
 impl Mechanism for Bump {
-    fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
+    fn reshape_arm(&self, now: &RigState<'_>, arm: &mut AxisArm) {
         if !self.hit(now, BumpedBody::Tool) {
             return;
         }
@@ -75,19 +75,19 @@ impl Mechanism for Bump {
         }
     }
 
-    fn move_base(&self, now: &Moment<'_>, world_from_base: &mut Pose) {
+    fn move_base(&self, now: &RigState<'_>, world_from_base: &mut Pose) {
         if self.hit(now, BumpedBody::Base) {
             *world_from_base *= self.motion();
         }
     }
 
-    fn move_board(&self, now: &Moment<'_>, world_from_board: &mut Pose) {
+    fn move_board(&self, now: &RigState<'_>, world_from_board: &mut Pose) {
         if self.hit(now, BumpedBody::Board) {
             *world_from_board *= self.motion();
         }
     }
 
-    fn distort_camera(&self, now: &Moment<'_>, body: Body, world_from_body: &mut Pose) {
+    fn distort_camera(&self, now: &RigState<'_>, body: Body, world_from_body: &mut Pose) {
         let loose = match body {
             Body::Tip => self.marker.is_none().then_some(BumpedBody::Marker),
             Body::Marker(marker) => (self.marker == Some(marker + 1)).then_some(BumpedBody::Marker),

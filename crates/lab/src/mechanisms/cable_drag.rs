@@ -23,7 +23,7 @@ pub struct CableDrag {
 }
 
 impl Mechanism for CableDrag {
-    fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
+    fn ahead(&mut self, _now: &RigState<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
         let from_anchor_deg = joint_rad[self.by - 1].to_degrees() - self.anchor_deg;
         let taut = (from_anchor_deg.abs() - self.slack_deg).max(0.0);
         Some((self.joint, -taut.to_radians() * self.cable_nm_rad / self.gear_nm_rad))

@@ -25,7 +25,7 @@ pub struct CameraDistortion {
 }
 
 impl Mechanism for CameraScale {
-    fn distort_camera(&self, _now: &Moment<'_>, _body: Body, world_from_body: &mut Pose) {
+    fn distort_camera(&self, _now: &RigState<'_>, _body: Body, world_from_body: &mut Pose) {
         let position = &mut world_from_body.translation.vector;
         let off = *position - Vector3::from(self.centre_m);
         *position += off.component_mul(&Vector3::from(self.percent)) / 100.0;
@@ -33,7 +33,7 @@ impl Mechanism for CameraScale {
 }
 
 impl Mechanism for CameraDistortion {
-    fn distort_camera(&self, _now: &Moment<'_>, _body: Body, world_from_body: &mut Pose) {
+    fn distort_camera(&self, _now: &RigState<'_>, _body: Body, world_from_body: &mut Pose) {
         let position = &mut world_from_body.translation.vector;
         let off = *position - Vector3::from(self.centre_m);
         *position += off * (self.mm_at_1m * 1e-3 * off.norm_squared());

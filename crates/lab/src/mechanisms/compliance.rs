@@ -38,7 +38,7 @@ impl Compliance {
 }
 
 impl Mechanism for Compliance {
-    fn ahead(&mut self, now: &Moment<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
+    fn ahead(&mut self, now: &RigState<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
         Some((self.joint, self.deflection_rad(now.gravity_nm[self.joint - 1])))
     }
 }

@@ -22,7 +22,7 @@ pub struct CrossedFriction {
 
 impl Mechanism for CrossedFriction {
     /// The rubbing part follows the moving joint until its spring is stronger than the friction.
-    fn ahead(&mut self, _now: &Moment<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
+    fn ahead(&mut self, _now: &RigState<'_>, joint_rad: &[f64]) -> Option<(usize, f64)> {
         let by_rad = joint_rad[self.by - 1];
         let limit = self.friction_nm / self.stiffness_nm_rad;
         let [was, wound] = self.before.unwrap_or([by_rad, 0.0]);

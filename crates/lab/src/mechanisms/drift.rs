@@ -36,13 +36,13 @@ pub enum DriftingBody {
 }
 
 impl Mechanism for ZeroDrift {
-    fn distort_encoder(&self, now: &Moment<'_>, reading_rad: &mut [f64]) {
+    fn distort_encoder(&self, now: &RigState<'_>, reading_rad: &mut [f64]) {
         reading_rad[self.joint - 1] -= self.deg_per_hour.to_radians() * now.session_s / 3600.0;
     }
 }
 
 impl FrameDrift {
-    fn shift(&self, now: &Moment<'_>, body: DriftingBody, pose: &mut Pose) {
+    fn shift(&self, now: &RigState<'_>, body: DriftingBody, pose: &mut Pose) {
         if self.body == body {
             let way_m = Vector3::from(self.mm_per_hour) * (1e-3 * now.session_s / 3600.0);
             *pose = Translation3::from(way_m) * *pose;
@@ -51,15 +51,15 @@ impl FrameDrift {
 }
 
 impl Mechanism for FrameDrift {
-    fn move_base(&self, now: &Moment<'_>, world_from_base: &mut Pose) {
+    fn move_base(&self, now: &RigState<'_>, world_from_base: &mut Pose) {
         self.shift(now, DriftingBody::Base, world_from_base);
     }
 
-    fn move_board(&self, now: &Moment<'_>, world_from_board: &mut Pose) {
+    fn move_board(&self, now: &RigState<'_>, world_from_board: &mut Pose) {
         self.shift(now, DriftingBody::Board, world_from_board);
     }
 
-    fn distort_camera(&self, now: &Moment<'_>, _body: Body, world_from_body: &mut Pose) {
+    fn distort_camera(&self, now: &RigState<'_>, _body: Body, world_from_body: &mut Pose) {
         self.shift(now, DriftingBody::Cameras, world_from_body);
     }
 }

@@ -31,18 +31,18 @@ fn yes() -> bool {
 }
 
 impl FrictionWindup {
-    fn limit_rad(&self, now: &Moment<'_>) -> f64 {
+    fn limit_rad(&self, now: &RigState<'_>) -> f64 {
         let load_nm = now.gravity_nm[self.joint - 1].abs();
         (self.friction_nm + self.load_share * load_nm) / self.stiffness_nm_rad
     }
 
-    fn sag_rad(&self, now: &Moment<'_>) -> f64 {
+    fn sag_rad(&self, now: &RigState<'_>) -> f64 {
         if self.balanced { 0.0 } else { now.gravity_nm[self.joint - 1] / self.stiffness_nm_rad }
     }
 }
 
 impl Mechanism for FrictionWindup {
-    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn motor_to_link(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         let (motor, limit) = (joint_rad[self.joint - 1] + self.sag_rad(now), self.limit_rad(now));
         let stuck = self.before.map_or(motor, |[_, link]| link);
         let link = stuck.clamp(motor - limit, motor + limit);
@@ -50,7 +50,7 @@ impl Mechanism for FrictionWindup {
         joint_rad[self.joint - 1] = link;
     }
 
-    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn link_to_motor(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         let (link, limit) = (joint_rad[self.joint - 1], self.limit_rad(now));
         let motor = motor_of_play(now, self.before, link, limit);
         self.before = Some([motor, link]);

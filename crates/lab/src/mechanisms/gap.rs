@@ -47,7 +47,7 @@ impl Gap {
     }
 
     /// The flank that gravity presses: `+1` where the link hangs ahead of the motor.
-    fn pressed(&self, now: &Moment<'_>) -> Option<f64> {
+    fn pressed(&self, now: &RigState<'_>) -> Option<f64> {
         let torque = now.gravity_nm[self.joint - 1];
         self.friction_nm.filter(|friction| torque.abs() > *friction).map(|_| torque.signum())
     }
@@ -61,7 +61,7 @@ impl Gap {
 }
 
 impl Mechanism for Gap {
-    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn motor_to_link(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         let motor = joint_rad[self.joint - 1] + self.carried_rad(joint_rad);
         let half = self.half_rad(motor);
         let link = match (self.pressed(now), self.before) {
@@ -73,7 +73,7 @@ impl Mechanism for Gap {
         joint_rad[self.joint - 1] += link - motor;
     }
 
-    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn link_to_motor(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         let link = joint_rad[self.joint - 1] + self.carried_rad(joint_rad);
         let half = self.half_rad(link);
         let motor = match self.pressed(now) {

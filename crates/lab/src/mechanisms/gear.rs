@@ -2,7 +2,7 @@
 //! the link is.
 
 use crate::mechanism::Named;
-use crate::{Mechanism, Moment};
+use crate::{Mechanism, RigState};
 
 /// The shape of a transmission's error.
 pub(super) trait Lead: Named + std::fmt::Debug + Send {
@@ -32,21 +32,21 @@ pub(super) trait Lead: Named + std::fmt::Debug + Send {
 }
 
 impl<L: Lead> Mechanism for L {
-    fn motor_to_link(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn motor_to_link(&mut self, _now: &RigState<'_>, joint_rad: &mut [f64]) {
         let q = &mut joint_rad[self.joint() - 1];
         if !self.of_reading() {
             *q = self.link_rad(*q);
         }
     }
 
-    fn link_to_motor(&mut self, _now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn link_to_motor(&mut self, _now: &RigState<'_>, joint_rad: &mut [f64]) {
         let q = &mut joint_rad[self.joint() - 1];
         if !self.of_reading() {
             *q += self.lead_rad(*q);
         }
     }
 
-    fn distort_encoder(&self, _now: &Moment<'_>, reading_rad: &mut [f64]) {
+    fn distort_encoder(&self, _now: &RigState<'_>, reading_rad: &mut [f64]) {
         let q = &mut reading_rad[self.joint() - 1];
         if self.of_reading() {
             *q += self.lead_rad(*q);

@@ -92,20 +92,20 @@ fn grow(arm: &mut AxisArm, links: &[usize], ppm: f64) {
 }
 
 impl ThermalGrowth {
-    fn read(&mut self, now: &Moment<'_>) {
+    fn read(&mut self, now: &RigState<'_>) {
         self.grown_ppm = self.per_kelvin_ppm * now.warmer_k;
     }
 }
 
 impl WarmUp {
-    fn warm(&mut self, now: &Moment<'_>) {
+    fn warm(&mut self, now: &RigState<'_>) {
         let (rise, time) = (self.rise_k, self.time_constant_s);
         self.heat.advance(now.session_s, |above, _| (rise - above) / time);
     }
 }
 
 impl RoomTemperature {
-    fn warm(&mut self, now: &Moment<'_>) {
+    fn warm(&mut self, now: &RigState<'_>) {
         let (swing, time) = (self.swing_k, self.time_constant_s);
         let turns = std::f64::consts::TAU / self.period_s;
         self.heat.advance(now.session_s, |above, t| (swing * (turns * t).sin() - above) / time);
@@ -115,15 +115,15 @@ impl RoomTemperature {
 macro_rules! growing {
     ($name:ident, $advance:ident, $ppm:expr) => {
         impl Mechanism for $name {
-            fn motor_to_link(&mut self, now: &Moment<'_>, _joint_rad: &mut [f64]) {
+            fn motor_to_link(&mut self, now: &RigState<'_>, _joint_rad: &mut [f64]) {
                 self.$advance(now);
             }
 
-            fn link_to_motor(&mut self, now: &Moment<'_>, _joint_rad: &mut [f64]) {
+            fn link_to_motor(&mut self, now: &RigState<'_>, _joint_rad: &mut [f64]) {
                 self.$advance(now);
             }
 
-            fn reshape_arm(&self, _now: &Moment<'_>, arm: &mut AxisArm) {
+            fn reshape_arm(&self, _now: &RigState<'_>, arm: &mut AxisArm) {
                 grow(arm, &self.links, $ppm(self));
             }
         }

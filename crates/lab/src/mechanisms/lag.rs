@@ -20,7 +20,7 @@ pub struct Lag {
 
 impl Lag {
     /// Where the follower of `leader_rad` is by now.
-    fn follow(&mut self, now: &Moment<'_>, leader_rad: f64) -> f64 {
+    fn follow(&mut self, now: &RigState<'_>, leader_rad: f64) -> f64 {
         let [time_s, follower_rad] = self.before.unwrap_or([now.time_s, leader_rad]);
         let left = (-(now.time_s - time_s) / self.time_constant_s).exp();
         let follower_rad = leader_rad + (follower_rad - leader_rad) * left;
@@ -30,11 +30,11 @@ impl Lag {
 }
 
 impl Mechanism for Lag {
-    fn motor_to_link(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn motor_to_link(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         joint_rad[self.joint - 1] = self.follow(now, joint_rad[self.joint - 1]);
     }
 
-    fn link_to_motor(&mut self, now: &Moment<'_>, joint_rad: &mut [f64]) {
+    fn link_to_motor(&mut self, now: &RigState<'_>, joint_rad: &mut [f64]) {
         let link_rad = joint_rad[self.joint - 1];
         if now.motors_lead {
             self.before = Some([now.time_s, link_rad]);

@@ -26,7 +26,7 @@ pub(super) struct Sag {
 
 impl LinkBending {
     /// Force and moment that the rest of the arm puts on the end of the link, in the link's zero position.
-    fn end_load(&self, now: &Moment<'_>, arm: &AxisArm, pull: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    fn end_load(&self, now: &RigState<'_>, arm: &AxisArm, pull: &Vector3<f64>) -> [Vector3<f64>; 2] {
         let link = self.link - 1;
         let end = arm.axes[link].point_m + arm.link_m(link);
         let mut load = [Vector3::zeros(); 2];
@@ -44,7 +44,7 @@ impl LinkBending {
         load
     }
 
-    pub(super) fn sag(&self, now: &Moment<'_>, arm: &AxisArm) -> Sag {
+    pub(super) fn sag(&self, now: &RigState<'_>, arm: &AxisArm) -> Sag {
         let link = self.link - 1;
         let pull =
             (0..=link).fold(*now.gravity_m_s2, |v, j| turn(&arm.axes[j].direction, &v, -now.link_rad[j]));
@@ -66,7 +66,7 @@ impl LinkBending {
 }
 
 impl Mechanism for LinkBending {
-    fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
+    fn reshape_arm(&self, now: &RigState<'_>, arm: &mut AxisArm) {
         let link = self.link - 1;
         let sag = self.sag(now, arm);
         let angle = sag.turn_rad.norm();

@@ -95,7 +95,7 @@ use crate::arm::AxisArm;
 use crate::board::Board;
 use crate::config::{not_negative, positive, value};
 use crate::mechanism::{Body, Named};
-use crate::{LabError, Mechanism, Moment};
+use crate::{LabError, Mechanism, RigState};
 use armcal_core::Pose;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -247,7 +247,7 @@ impl Keys {
 
 /// Where the motor of a play of `half_rad` to either side is, for a link that came to `link_rad`; `before` are
 /// motor and link of the moment before.
-fn motor_of_play(now: &Moment<'_>, before: Option<[f64; 2]>, link_rad: f64, half_rad: f64) -> f64 {
+fn motor_of_play(now: &RigState<'_>, before: Option<[f64; 2]>, link_rad: f64, half_rad: f64) -> f64 {
     let Some([motor, link]) = before else { return link_rad };
     let moved = link_rad - link;
     if now.motors_lead && moved.abs() > STILL_RAD {
@@ -261,7 +261,7 @@ fn motor_of_play(now: &Moment<'_>, before: Option<[f64; 2]>, link_rad: f64, half
 const STILL_RAD: f64 = 1e-9;
 
 /// Whether something that happens `at_s` into a recording, and is put back `until_s` into it, holds now.
-fn happened(now: &Moment<'_>, recording: usize, at_s: f64, until_s: Option<f64>) -> bool {
+fn happened(now: &RigState<'_>, recording: usize, at_s: f64, until_s: Option<f64>) -> bool {
     let reached = |time_s| now.recording > recording || (now.recording == recording && now.time_s >= time_s);
     reached(at_s) && !until_s.is_some_and(reached)
 }

@@ -39,8 +39,8 @@ impl Rest {
         }
     }
 
-    fn now(&self) -> Moment<'_> {
-        Moment {
+    fn now(&self) -> RigState<'_> {
+        RigState {
             time_s: self.session_s,
             session_s: self.session_s,
             recording: self.recording,

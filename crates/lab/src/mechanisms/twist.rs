@@ -16,7 +16,7 @@ pub struct Twist {
 }
 
 impl Mechanism for Twist {
-    fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
+    fn reshape_arm(&self, now: &RigState<'_>, arm: &mut AxisArm) {
         let link = self.link - 1;
         let share = now.link_rad[self.by - 1] / std::f64::consts::FRAC_PI_4;
         if let Some(direction) = arm.link_m(link).try_normalize(1e-9) {

@@ -34,7 +34,7 @@ impl Waves {
 }
 
 impl Mechanism for Waves {
-    fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
+    fn reshape_arm(&self, now: &RigState<'_>, arm: &mut AxisArm) {
         arm.tip_m += self.shift_m(now.link_rad);
     }
 }

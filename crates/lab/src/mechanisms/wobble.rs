@@ -19,7 +19,7 @@ pub struct AxisWobble {
 }
 
 impl Mechanism for AxisWobble {
-    fn reshape_arm(&self, now: &Moment<'_>, arm: &mut AxisArm) {
+    fn reshape_arm(&self, now: &RigState<'_>, arm: &mut AxisArm) {
         let joint = self.joint - 1;
         let axis = arm.axes[joint];
         let q = now.link_rad[joint];

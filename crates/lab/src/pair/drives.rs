@@ -2,7 +2,7 @@
 
 use super::{BuiltArm, PairArmConfig};
 use crate::mechanisms::MechanismConfig;
-use crate::{LabError, Mechanism, Moment};
+use crate::{LabError, Mechanism, RigState};
 use nalgebra::Vector3;
 
 /// Gravity in the world [m/s^2].
@@ -33,7 +33,7 @@ impl<'a> Drives<'a> {
         let gravity_nm = built.arm.gravity_torque(link_rad, &gravity_m_s2, &masses_kg, 0.0);
         // Recordings begin a quarter of an hour apart.
         let session_s = time_s + 900.0 * self.recording as f64;
-        let now = Moment {
+        let now = RigState {
             time_s,
             session_s,
             recording: self.recording,

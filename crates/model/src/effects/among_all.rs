@@ -1,8 +1,8 @@
 //! What is said of one arm by itself, in the names and numbers of all arms that it stands among.
 
+use super::context::ARM;
 use super::expression::Expression;
 use super::is_of_effect;
-use super::placing::ARM;
 use super::spec::EffectSpec;
 use crate::{Arm, ModelError};
 

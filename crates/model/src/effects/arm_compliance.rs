@@ -59,14 +59,14 @@ struct ArmCompliance {
     joints: Vec<usize>,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let turning = |joint: &usize| placing.motion(*joint) == Motion::Revolute;
-    let joints: Vec<usize> = placing.zero.joints_of(placing.arm()?).filter(turning).collect();
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let turning = |joint: &usize| context.motion(*joint) == Motion::Revolute;
+    let joints: Vec<usize> = context.zero.joints_of(context.arm()?).filter(turning).collect();
     if joints.len() < 2 {
         return Err("fewer than two joints turn; use compliance".to_owned());
     }
     let of_joint = |joint: &usize| {
-        let per_deg = 1f64.to_radians() / placing.reference_torque_nm(*joint);
+        let per_deg = 1f64.to_radians() / context.reference_torque_nm(*joint);
         let meaning = format!("angle of joint {} per gravity torque", joint + 1);
         let (name, unit) = (format!("compliance{}", joint + 1), Unit::RadianPerNewtonMetre);
         amplitude(&name, unit, TYPICAL_DEG * per_deg, 20.0 * TYPICAL_DEG * per_deg, meaning)

@@ -37,14 +37,14 @@ struct AxisTilt {
     slot: Slot,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    placing
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    context
         .parallel_to_previous(joint)
         .ok_or("its axis is not parallel to the one before it, so the chain describes every small tilt")?;
-    let segment = placing.zero.joints[joint].segment;
+    let segment = context.zero.joints[joint].segment;
     let slot = Slot::Before(segment);
-    let described = match placing.model.segment_before(segment).map(|segment| &segment.geometry) {
+    let described = match context.model.segment_before(segment).map(|segment| &segment.geometry) {
         Some(Geometry::StandardDh { hayati } | Geometry::ModifiedDh { hayati }) => *hayati,
         Some(Geometry::Origin { .. } | Geometry::Axis(_)) | None => true,
     };

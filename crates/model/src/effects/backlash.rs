@@ -55,11 +55,11 @@ struct Backlash {
     resolved: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.joint()?;
-    let (typical, bound) = (placing.joint_size(joint, 0.5), placing.joint_size(joint, 8.0));
-    let width = amplitude("width", placing.joint_unit(joint), typical, bound, "width of the gap");
-    let resolved = placing.joint_size(joint, RESOLVED_DEG);
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.joint()?;
+    let (typical, bound) = (context.joint_size(joint, 0.5), context.joint_size(joint, 8.0));
+    let width = amplitude("width", context.joint_unit(joint), typical, bound, "width of the gap");
+    let resolved = context.joint_size(joint, RESOLVED_DEG);
     Ok(Placement::new(vec![width], Backlash { joint, resolved }))
 }
 

@@ -58,14 +58,14 @@ const OUTER: usize = 2;
 #[derive(Debug)]
 struct BaseCompliance {
     arm: usize,
-    shares: Shares,
+    shares: TorqueTerms,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let arm = placing.arm()?;
-    let joints = placing.zero.joints_of(arm);
-    let shares = Shares::of(placing, joints.start + OUTER.min(joints.len()) - 1);
-    let largest = joints.map(|joint| placing.reference_torque_nm(joint)).fold(1e-3, f64::max);
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let arm = context.arm()?;
+    let joints = context.zero.joints_of(arm);
+    let shares = TorqueTerms::of(context, joints.start + OUTER.min(joints.len()) - 1);
+    let largest = joints.map(|joint| context.reference_torque_nm(joint)).fold(1e-3, f64::max);
     let per_deg = 1f64.to_radians() / largest;
     let unit = Unit::RadianPerNewtonMetre;
     let amplitudes =
@@ -74,10 +74,10 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
 }
 
 /// Between the foot and the axis of the second joint.
-fn heights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    let Ok(arm) = placing.arm() else { return Vec::new() };
-    let Some(second) = placing.zero.joints_of(arm).nth(1) else { return Vec::new() };
-    let (second, base) = (&placing.zero.joints[second], &placing.zero.bases[arm]);
+fn heights(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+    let Ok(arm) = context.arm() else { return Vec::new() };
+    let Some(second) = context.zero.joints_of(arm).nth(1) else { return Vec::new() };
+    let (second, base) = (&context.zero.joints[second], &context.zero.bases[arm]);
     let height_m = base.rotation.column(2).dot(&(second.origin_m - base.translation_m));
     [0.5, 1.0].iter().map(|part| part * height_m).filter(|height| *height > 0.0).collect()
 }

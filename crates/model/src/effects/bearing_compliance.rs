@@ -40,20 +40,20 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct BearingCompliance {
     joint: usize,
-    shares: Shares,
+    shares: TorqueTerms,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
     if joint == 0 {
         return Err("the bearing of the first joint is base_compliance at its height; use that".to_owned());
     }
-    let shares = Shares::of(placing, joint);
-    let per_deg = 1f64.to_radians() / placing.reference_torque_nm(joint);
+    let shares = TorqueTerms::of(context, joint);
+    let per_deg = 1f64.to_radians() / context.reference_torque_nm(joint);
     let unit = Unit::RadianPerNewtonMetre;
     let meaning = "tilt per moment across the axis";
     let amplitudes = shares.amplitudes("tilt", unit, 0.3 * per_deg, 6.0 * per_deg, meaning);
-    let slot = Slot::Before(placing.zero.joints[joint].segment);
+    let slot = Slot::Before(context.zero.joints[joint].segment);
     Ok(Placement::twisting(slot, amplitudes, BearingCompliance { joint, shares }))
 }
 

@@ -45,9 +45,9 @@ struct BeltBacklash {
     sense: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    let sense = placing
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    let sense = context
         .parallel_to_previous(joint)
         .ok_or("a belt from the base needs an axis parallel to the one before it")?;
     let deg = 1f64.to_radians();

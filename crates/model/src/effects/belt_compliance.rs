@@ -46,13 +46,13 @@ struct BeltCompliance {
     load: bool,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    let sense = placing
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    let sense = context
         .parallel_to_previous(joint)
         .ok_or("a belt from the base needs an axis parallel to the one before it")?;
-    let load = placing.session.load;
-    let per_deg = 1f64.to_radians() / placing.reference_torque_nm(joint - 1);
+    let load = context.session.load;
+    let per_deg = 1f64.to_radians() / context.reference_torque_nm(joint - 1);
     let compliance = |quantity: &str, meaning: &str| {
         amplitude(quantity, Unit::RadianPerNewtonMetre, 0.4 * per_deg, 8.0 * per_deg, meaning)
     };

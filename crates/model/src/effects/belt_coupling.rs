@@ -36,11 +36,11 @@ struct BeltCoupling {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    let previous = joint.checked_sub(1).filter(|_| !placing.zero.is_first(joint));
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    let previous = joint.checked_sub(1).filter(|_| !context.zero.is_first(joint));
     let previous = previous.ok_or("there is no joint before the first")?;
-    if placing.joint_unit(previous) != Unit::Radian {
+    if context.joint_unit(previous) != Unit::Radian {
         return Err(format!("joint {} before it slides, and this effect is about turns", previous + 1));
     }
     let coupling =

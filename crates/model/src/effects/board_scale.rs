@@ -34,8 +34,8 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct BoardScale;
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    if placing.session.cavities.is_empty() {
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    if context.session.cavities.is_empty() {
         return Err("no observation is seated in the board".to_owned());
     }
     let scale = |axis: &str| {

@@ -45,19 +45,19 @@ struct BoardShift {
     middles_m: BTreeMap<usize, Vector3<f64>>,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    placing.event()?;
-    if !placing.session.seated_and_tracked() {
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    context.event()?;
+    if !context.session.seated_and_tracked() {
         return Err(
             "it needs dwells in cavities and tracked ones; with one kind alone, use frame_shift".to_owned()
         );
     }
-    if let Some(Since::Recording(recording)) = placing.spec.since
-        && placing.model.board_is_estimated(recording)
+    if let Some(Since::Recording(recording)) = context.spec.since
+        && context.model.board_is_estimated(recording)
     {
         return Err(format!("the board's pose in recording {recording} is estimated already"));
     }
-    let physics = BoardShift { middles_m: placing.session.board_centres_m.clone() };
+    let physics = BoardShift { middles_m: context.session.board_centres_m.clone() };
     Ok(Placement::new(rigid_motion(" the board's"), physics))
 }
 

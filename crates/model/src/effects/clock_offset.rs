@@ -31,8 +31,8 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct ClockOffset;
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    if !placing.session.moving {
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    if !context.session.moving {
         return Err("clocks do not matter in dwells; it needs observations of the moving arm".to_owned());
     }
     let offset = amplitude("offset", Unit::Second, 0.01, 0.3, "by how much the tip is later than the joints");

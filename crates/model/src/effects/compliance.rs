@@ -53,14 +53,14 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct Compliance {
     joint: usize,
-    shares: Shares,
+    shares: TorqueTerms,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    placing.loaded(joint)?;
-    let shares = Shares::of(placing, joint);
-    let per_deg = 1f64.to_radians() / placing.reference_torque_nm(joint);
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    context.loaded(joint)?;
+    let shares = TorqueTerms::of(context, joint);
+    let per_deg = 1f64.to_radians() / context.reference_torque_nm(joint);
     let unit = Unit::RadianPerNewtonMetre;
     let amplitudes =
         shares.amplitudes("compliance", unit, 0.4 * per_deg, 8.0 * per_deg, "angle per gravity torque");

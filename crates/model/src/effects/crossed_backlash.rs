@@ -63,28 +63,28 @@ struct CrossedBacklash {
     per_unit: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.joint()?;
-    let number = placing.shape("from").unwrap_or_default();
-    let from = (0..placing.zero.joints.len())
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.joint()?;
+    let number = context.shape("from").unwrap_or_default();
+    let from = (0..context.zero.joints.len())
         .find(|k| (*k + 1) as f64 == number && *k != joint)
         .ok_or_else(|| format!("from = {number} is not the number of another joint"))?;
-    let (typical, bound) = (placing.joint_size(joint, 0.4), placing.joint_size(joint, 8.0));
+    let (typical, bound) = (context.joint_size(joint, 0.4), context.joint_size(joint, 8.0));
     let width = amplitude(
         "width",
-        placing.joint_unit(joint),
+        context.joint_unit(joint),
         typical,
         bound,
         "difference between the two directions",
     );
-    let resolved = placing.joint_size(from, RESOLVED_DEG);
-    let per_unit = placing.joint_size(joint, 1.0) / placing.joint_size(from, 1.0);
+    let resolved = context.joint_size(from, RESOLVED_DEG);
+    let per_unit = context.joint_size(joint, 1.0) / context.joint_size(from, 1.0);
     Ok(Placement::new(vec![width], CrossedBacklash { joint, from, resolved, per_unit }))
 }
 
-fn others(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    let own = placing.spec.target.unwrap_or_default();
-    let joints = placing.model.chain().joints_beside(own);
+fn others(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+    let own = context.spec.target.unwrap_or_default();
+    let joints = context.model.chain().joints_beside(own);
     let near = |k: &usize| *k != own && (joints.len() <= FEW_JOINTS || k.abs_diff(own) == 1);
     joints.clone().filter(near).map(|k| (k + 1) as f64).collect()
 }

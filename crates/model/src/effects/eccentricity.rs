@@ -39,8 +39,8 @@ pub(super) struct Harmonic {
     pub harmonic: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
     Ok(Placement::new(amplitudes_wave(0.4, 8.0, " q"), Harmonic { joint, harmonic: 1.0 }))
 }
 

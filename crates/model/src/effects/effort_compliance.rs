@@ -38,12 +38,12 @@ struct EffortCompliance {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    if placing.largest_effort_nm(joint)? <= 0.0 {
-        return Err(format!("the measured effort of `{}` is zero throughout", placing.joint_name(joint)));
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    if context.largest_effort_nm(joint)? <= 0.0 {
+        return Err(format!("the measured effort of `{}` is zero throughout", context.joint_name(joint)));
     }
-    let per_deg = 1f64.to_radians() / placing.reference_torque_nm(joint);
+    let per_deg = 1f64.to_radians() / context.reference_torque_nm(joint);
     let unit = Unit::RadianPerNewtonMetre;
     let compliance = amplitude("compliance", unit, 0.4 * per_deg, 8.0 * per_deg, "angle per measured effort");
     Ok(Placement::new(vec![compliance], EffortCompliance { joint }))

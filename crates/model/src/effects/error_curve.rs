@@ -70,9 +70,9 @@ struct ErrorCurve {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    let asked = placing.shape("harmonics").unwrap_or(16.0);
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    let asked = context.shape("harmonics").unwrap_or(16.0);
     let harmonics = asked as usize;
     if harmonics as f64 != asked || !(1..=180).contains(&harmonics) {
         return Err(format!("harmonics = {asked} must be a whole number from 1 to 180"));
@@ -80,7 +80,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     // Spectral density of the Matern 5/2 kernel at n turns, up to a factor.
     let density = |n: f64| (5.0 + (n * LENGTH_RAD).powi(2)).powi(-3);
     let all: f64 = (1..=180).map(|n| density(f64::from(n))).sum();
-    let typical_rad = placing.shape("typical").unwrap_or(TYPICAL_RAD);
+    let typical_rad = context.shape("typical").unwrap_or(TYPICAL_RAD);
     let share = |n: usize| (density(n as f64) / all).sqrt();
     // What is expected to be small may still turn out large: bounds are no tighter than those of an ordinary curve.
     let widest_rad = typical_rad.max(TYPICAL_RAD);

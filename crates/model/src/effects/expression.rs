@@ -89,15 +89,15 @@ struct UserEffect {
     acts: Acts,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let expression = placing
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let expression = context
         .spec
         .expression
         .as_ref()
         .ok_or("write it as an [[effects]] table with name, formula, acts_on and parameters")?;
     let formula = Formula::read(&expression.formula)?;
     let mut amplitudes = Vec::new();
-    for (name, said) in &placing.spec.overrides {
+    for (name, said) in &context.spec.overrides {
         let unit = said.unit.as_deref().unwrap_or(Unit::One.symbol());
         let (unit, si) = unit_of(unit).ok_or_else(|| unknown_unit(name, unit))?;
         let sigma = said.prior.or(said.bound.map(|bound| SIGMA_OF_BOUND * bound));
@@ -116,24 +116,24 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
             format!("{name} of the user's formula"),
         ));
     }
-    let names: Vec<&str> = placing.spec.overrides.keys().map(String::as_str).collect();
+    let names: Vec<&str> = context.spec.overrides.keys().map(String::as_str).collect();
     let variables = formula
         .variables()
         .iter()
-        .map(|name| variable(name, &names, placing))
+        .map(|name| variable(name, &names, context))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(unused) = (0..names.len()).find(|k| !variables.contains(&Variable::Parameter(*k))) {
         return Err(format!("the formula \"{}\" has no \"{}\"", expression.formula, names[unused]));
     }
-    let acts = acts_on(&expression.acts_on, placing)?;
+    let acts = acts_on(&expression.acts_on, context)?;
     let measures: Vec<Measure> = variables
         .iter()
         .map(|variable| match variable {
             Variable::Parameter(k) => Measure::Known(dimension(amplitudes[*k].unit)),
-            other => other.measure(placing),
+            other => other.measure(context),
         })
         .collect();
-    let expected = acts.dimension(placing);
+    let expected = acts.dimension(context);
     let wrong =
         |why: String| Err(format!("the units of the formula \"{}\" do not fit: {why}", expression.formula));
     match formula.measure(&measures) {
@@ -162,12 +162,12 @@ fn unknown_unit(name: &str, unit: &str) -> String {
     format!("parameter \"{name}\": there is no unit \"{unit}\"{hint} The units are {}", known.join(", "))
 }
 
-fn variable(name: &str, parameters: &[&str], placing: &Placing<'_>) -> Result<Variable, String> {
+fn variable(name: &str, parameters: &[&str], context: &EffectContext<'_>) -> Result<Variable, String> {
     if let Some(k) = parameters.iter().position(|parameter| *parameter == name) {
         return Ok(Variable::Parameter(k));
     }
-    let joints = placing.zero.joints.len();
-    let session = placing.session;
+    let joints = context.zero.joints.len();
+    let session = context.session;
     let numbered = |prefix: &str| {
         let number: usize = name.strip_prefix(prefix)?.parse().ok()?;
         (1..=joints).contains(&number).then(|| number - 1)
@@ -190,7 +190,7 @@ fn variable(name: &str, parameters: &[&str], placing: &Placing<'_>) -> Result<Va
         return Ok(Variable::Torque(joint));
     }
     if let Some(joint) = numbered("effort") {
-        let known = placing.largest_effort_nm(joint).map(|_| Variable::Effort(joint));
+        let known = context.largest_effort_nm(joint).map(|_| Variable::Effort(joint));
         return known.map_err(|why| format!("the formula needs {name}, and {why}"));
     }
     let of_joints =
@@ -208,14 +208,14 @@ fn variable(name: &str, parameters: &[&str], placing: &Placing<'_>) -> Result<Va
     ))
 }
 
-fn acts_on(text: &str, placing: &Placing<'_>) -> Result<Acts, String> {
+fn acts_on(text: &str, context: &EffectContext<'_>) -> Result<Acts, String> {
     if let Some(axis) = ["world.x", "world.y", "world.z"].iter().position(|name| *name == text) {
         return Ok(Acts::World(axis));
     }
     if text == LENGTHS {
-        return Ok(Acts::Lengths(placing.model.lengths_m()));
+        return Ok(Acts::Lengths(context.model.lengths_m()));
     }
-    let model = placing.model;
+    let model = context.model;
     let joint_names = model.chain().joint_names();
     let reading = text.strip_prefix('q').filter(|number| number.parse::<usize>().is_ok());
     if reading.is_some() || joint_names.iter().any(|name| name == text) {
@@ -235,10 +235,10 @@ fn acts_on(text: &str, placing: &Placing<'_>) -> Result<Acts, String> {
 }
 
 impl Acts {
-    fn dimension(&self, placing: &Placing<'_>) -> Dimension {
+    fn dimension(&self, context: &EffectContext<'_>) -> Dimension {
         dimension(match self {
-            Acts::Joint(joint) => placing.joint_unit(*joint),
-            Acts::Parameter(index) => placing.model.parameters()[*index].unit,
+            Acts::Joint(joint) => context.joint_unit(*joint),
+            Acts::Parameter(index) => context.model.parameters()[*index].unit,
             Acts::Lengths(_) => Unit::One,
             Acts::World(_) => Unit::Metre,
         })
@@ -247,12 +247,12 @@ impl Acts {
 
 impl Variable {
     /// The unit of a driver.
-    fn measure(self, placing: &Placing<'_>) -> Measure {
+    fn measure(self, context: &EffectContext<'_>) -> Measure {
         let unit = match self {
             Variable::Parameter(_) => return Measure::Anything,
-            Variable::Reading(joint) => placing.joint_unit(joint),
+            Variable::Reading(joint) => context.joint_unit(joint),
             Variable::Arrival(_) => Unit::One,
-            Variable::Torque(joint) | Variable::Effort(joint) => match placing.motion(joint) {
+            Variable::Torque(joint) | Variable::Effort(joint) => match context.motion(joint) {
                 Motion::Revolute => Unit::NewtonMetre,
                 // Newtons: no parameter has them, so they go unchecked.
                 Motion::Prismatic => return Measure::Anything,

@@ -35,8 +35,8 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct FrameDrift;
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    placing.lasting()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    context.lasting()?;
     let amplitudes = amplitudes_xyz("", Unit::Metre, 0.8e-3, 0.03, "drift over the whole session along");
     Ok(Placement::twisting(Slot::WORLD, amplitudes, FrameDrift))
 }

@@ -44,10 +44,10 @@ struct FrameShift {
     centre_m: Vector3<f64>,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    placing.event()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    context.event()?;
     let amplitudes = rigid_motion("");
-    let physics = FrameShift { centre_m: placing.volume_centre_m() };
+    let physics = FrameShift { centre_m: context.volume_centre_m() };
     Ok(Placement::twisting(Slot::WORLD, amplitudes, physics))
 }
 

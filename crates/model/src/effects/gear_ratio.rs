@@ -45,8 +45,8 @@ struct GearRatio {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.joint()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.joint()?;
     let scale = amplitude("scale", Unit::One, 0.008, 0.3, "relative error of the joint angle");
     Ok(Placement::new(vec![scale], GearRatio { joint }))
 }

@@ -81,28 +81,28 @@ struct GravityBacklash {
     per_torque: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.joint()?;
-    placing.loaded(joint)?;
-    let (typical, bound) = (placing.joint_size(joint, 0.5), placing.joint_size(joint, 8.0));
-    let width = amplitude("width", placing.joint_unit(joint), typical, bound, "width of the gap");
-    let per_torque = 1.0 / placing.reference_torque_nm(joint);
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.joint()?;
+    context.loaded(joint)?;
+    let (typical, bound) = (context.joint_size(joint, 0.5), context.joint_size(joint, 8.0));
+    let width = amplitude("width", context.joint_unit(joint), typical, bound, "width of the gap");
+    let per_torque = 1.0 / context.reference_torque_nm(joint);
     Ok(Placement::new(vec![width], GravityBacklash { joint, per_torque }))
 }
 
-fn drags(_placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn drags(_placing: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     vec![0.05, 0.1, 0.2, 0.3, 0.5]
 }
 
 /// A rigid gap changes flanks at once; the default allows for masses that nobody knows.
-fn sharp(_placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn sharp(_placing: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     vec![0.01]
 }
 
 /// The last joint has no outer links.
-fn weights(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    match placing.spec.target {
-        Some(joint) if placing.zero.joints.get(joint).is_some_and(|j| j.links.len() > 1) => {
+fn weights(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+    match context.spec.target {
+        Some(joint) if context.zero.joints.get(joint).is_some_and(|j| j.links.len() > 1) => {
             vec![0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 3.0]
         }
         _ => Vec::new(),

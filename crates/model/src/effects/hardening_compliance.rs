@@ -39,18 +39,18 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct HardeningCompliance {
     joint: usize,
-    shares: Shares,
+    shares: TorqueTerms,
     /// Index of the cubic amplitude; the quintic one follows.
     cubic: usize,
     per_torque: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
-    placing.loaded(joint)?;
-    let shares = Shares::of(placing, joint);
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
+    context.loaded(joint)?;
+    let shares = TorqueTerms::of(context, joint);
     let deg = 1f64.to_radians();
-    let per_torque = 1.0 / placing.reference_torque_nm(joint);
+    let per_torque = 1.0 / context.reference_torque_nm(joint);
     let (typical, bound) = (0.4 * deg * per_torque, 8.0 * deg * per_torque);
     let mut amplitudes = shares.amplitudes(
         "compliance",

@@ -1,8 +1,8 @@
 //! Effects in a model: adding them, what could be added, and what drives them.
 
+use super::context::{ARM, EffectContext};
 use super::kind::{EffectKind, Offered, Target};
 use super::placed::{self, Effects, PlacedEffect};
-use super::placing::{ARM, Placing};
 use super::spec::Since;
 use super::state::SEATED;
 use super::{Drivers, EffectSpec, NominalPose, Session, catalogue};
@@ -89,8 +89,8 @@ impl Model {
                     let telling = steps.iter().filter(|(_, side)| *side >= least);
                     members.extend(telling.map(|(dwell, _)| at(*dwell)));
                 }
-                let placing = Placing { model: self, session, spec: &spec, kind, zero: &zero };
-                members.extend(shaped(&placing, observations));
+                let context = EffectContext { model: self, session, spec: &spec, kind, zero: &zero };
+                members.extend(shaped(&context, observations));
                 members.retain(|spec| self.offers(spec, session, &zero));
                 if !members.is_empty() {
                     families.push((spec, members));
@@ -141,8 +141,8 @@ impl Model {
         let Some((shape, values)) = part.and_then(|shape| Some((shape, shape.values?))) else {
             return vec![spec];
         };
-        let placing = Placing { model: self, session, spec: &spec, kind, zero };
-        values(&placing, &[]).iter().map(|value| spec.clone().with(shape.name, *value)).collect()
+        let context = EffectContext { model: self, session, spec: &spec, kind, zero };
+        values(&context, &[]).iter().map(|value| spec.clone().with(shape.name, *value)).collect()
     }
 }
 
@@ -205,17 +205,17 @@ fn steps(observations: &[Observation]) -> Vec<(DwellId, usize)> {
 /// A kind with every value of a shape that is worth trying, and with every two of different shapes: where a torque changes
 /// sign and how sharply, say, is seen only together. Who holds the arm is asked of each kind by itself: with another shape
 /// beside it a base that rocks at the height of a joint is that joint's spring.
-fn shaped(placing: &Placing<'_>, observations: &[Observation]) -> Vec<EffectSpec> {
-    let searched = placing.kind.shapes.iter().filter(|shape| shape.parameter);
-    let searched = searched.filter_map(|shape| Some((shape.name, shape.values?(placing, observations))));
+fn shaped(context: &EffectContext<'_>, observations: &[Observation]) -> Vec<EffectSpec> {
+    let searched = context.kind.shapes.iter().filter(|shape| shape.parameter);
+    let searched = searched.filter_map(|shape| Some((shape.name, shape.values?(context, observations))));
     let searched: Vec<(&str, Vec<f64>)> = searched.collect();
     let with = |spec: &EffectSpec, (name, values): &(&str, Vec<f64>)| -> Vec<EffectSpec> {
         values.iter().map(|v| spec.clone().with(name, readable(*v))).collect()
     };
-    let mut members: Vec<EffectSpec> = searched.iter().flat_map(|shape| with(placing.spec, shape)).collect();
+    let mut members: Vec<EffectSpec> = searched.iter().flat_map(|shape| with(context.spec, shape)).collect();
     let own: Vec<_> = searched.iter().filter(|(name, _)| *name != SEATED.name).collect();
     for (k, shape) in own.iter().enumerate() {
-        for first in with(placing.spec, shape) {
+        for first in with(context.spec, shape) {
             members.extend(own[k + 1..].iter().flat_map(|later| with(&first, later)));
         }
     }

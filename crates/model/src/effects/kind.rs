@@ -1,7 +1,7 @@
 //! What the catalogue says about a kind of effect, and what placing it gives.
 
+use super::context::EffectContext;
 use super::physics::{AnyPhysics, Slot};
-use super::placing::Placing;
 use armcal_core::{Observation, Parameter, Unit};
 use serde::Serialize;
 use std::sync::Arc;
@@ -39,7 +39,7 @@ pub struct EffectKind {
     /// Its source file, whose header is its documentation.
     pub(crate) source: &'static str,
     /// Puts it in its place, or says why it has none there.
-    pub(crate) place: fn(&Placing<'_>) -> Result<Placement, String>,
+    pub(crate) place: fn(&EffectContext<'_>) -> Result<Placement, String>,
 }
 
 impl EffectKind {
@@ -187,7 +187,7 @@ pub enum Offered {
 }
 
 /// The values of a shape worth trying, where it would be placed, for these observations.
-pub(crate) type Values = fn(&Placing<'_>, &[Observation]) -> Vec<f64>;
+pub(crate) type Values = fn(&EffectContext<'_>, &[Observation]) -> Vec<f64>;
 
 /// A number of an effect that is not an amplitude.
 #[derive(Debug, Clone, Copy)]

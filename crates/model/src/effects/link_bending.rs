@@ -49,15 +49,15 @@ struct LinkBending {
     /// The joint of the link, and the one at its end.
     link: usize,
     next: usize,
-    shares: Shares,
+    shares: TorqueTerms,
     /// Inverse of EI for a sag of 1 m under the nominal masses, and under 1 kg at the tip.
     per_sag: f64,
     per_load_sag: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let link = placing.joint()?;
-    let zero = placing.zero;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let link = context.joint()?;
+    let zero = context.zero;
     if zero.outer(link).is_empty() {
         return Err("bending of the last link is the same as compliance of its joint; use that".to_owned());
     }
@@ -69,16 +69,16 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
     if length_m < SHORTEST_M {
         return Err(format!("its link is only {:.0} mm long", length_m * 1e3));
     }
-    let gravity = placing.gravity_mps2();
+    let gravity = context.gravity_mps2();
     let outer_kg: f64 = zero.outer(link).map(|k| zero.link_mass_kg(k)).sum();
     let own_kg = zero.link_mass_kg(zero.joints[link].links.start);
     let force_n = (outer_kg + OWN_SHARE * own_kg) * gravity;
     let sag =
         |force_n: f64, moment_nm: f64| force_n * length_m.powi(3) / 3.0 + moment_nm * length_m.powi(2) / 2.0;
-    let shares = Shares::of(placing, link);
+    let shares = TorqueTerms::of(context, link);
     let amplitudes = shares.amplitudes("sag", Unit::Metre, 1.2e-3, 0.03, "sag of the link held out level");
-    let per_sag = 1.0 / sag(force_n, placing.reference_torque_nm(next));
-    let per_load_sag = 1.0 / sag(gravity, gravity * placing.reach_m(next));
+    let per_sag = 1.0 / sag(force_n, context.reference_torque_nm(next));
+    let per_load_sag = 1.0 / sag(gravity, gravity * context.reach_m(next));
     let slot = Slot::Before(zero.joints[next].segment);
     Ok(Placement::twisting(slot, amplitudes, LinkBending { link, next, shares, per_sag, per_load_sag }))
 }

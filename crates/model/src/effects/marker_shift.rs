@@ -34,9 +34,9 @@ pub(super) const KIND: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let (name, first) = placing.marker()?;
-    placing.event()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let (name, first) = context.marker()?;
+    context.event()?;
     let meaning = format!("shift of marker {name} on its link along");
     Ok(Placement::new(shift_xyz(&meaning), Moved { first }))
 }

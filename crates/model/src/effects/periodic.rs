@@ -57,15 +57,15 @@ struct Periodic {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
     Ok(Placement::new(amplitudes_wave(0.15, 3.0, "(n q)"), Periodic { joint }))
 }
 
 /// From the third harmonic to what the readings of the joint can resolve (half a period between neighbours on
 /// average), finely enough that no line is missed: a line is one period over the range wide.
-fn frequencies(placing: &Placing<'_>, observations: &[Observation]) -> Vec<f64> {
-    let joint = placing.spec.target.unwrap_or_default();
+fn frequencies(context: &EffectContext<'_>, observations: &[Observation]) -> Vec<f64> {
+    let joint = context.spec.target.unwrap_or_default();
     let mut readings: Vec<f64> = observations
         .iter()
         .filter_map(|o| o.joint_rad.get(joint).copied())

@@ -1,10 +1,10 @@
 //! The effects of a model: placing them and evaluating them together.
 
+use super::context::EffectContext;
 use super::drivers::Drivers;
 use super::kind::{EffectKind, Family, Placement};
 use super::nominal_pose::NominalPose;
 use super::physics::{AnyPhysics, Deformation, Slot};
-use super::placing::Placing;
 use super::session::Session;
 use super::spec::EffectSpec;
 use super::state;
@@ -103,15 +103,15 @@ pub(crate) fn place(
 ) -> Result<(PlacedEffect, Vec<Parameter>), ModelError> {
     let kind = spec.kind()?;
     let bad = |problem: String| ModelError::BadEffect { effect: spec.to_string(), problem };
-    let placing = Placing { model, session, spec, kind, zero };
-    check_words(&placing).map_err(bad)?;
-    let Placement { amplitudes, physics, slots, distorts } = (kind.place)(&placing).map_err(bad)?;
+    let context = EffectContext { model, session, spec, kind, zero };
+    check_words(&context).map_err(bad)?;
+    let Placement { amplitudes, physics, slots, distorts } = (kind.place)(&context).map_err(bad)?;
     let count = amplitudes.len();
     let mut parameters = amplitudes;
-    let shapes = kind.shapes.iter().filter(|shape| shape.parameter && state::matters(shape, &placing));
+    let shapes = kind.shapes.iter().filter(|shape| shape.parameter && state::matters(shape, &context));
     parameters.extend(shapes.map(|shape| {
         let (name, meaning) = (shape.name.to_owned(), shape.meaning.to_owned());
-        let nominal = placing.shape(shape.name).unwrap_or_default();
+        let nominal = context.shape(shape.name).unwrap_or_default();
         let (lower, upper) = (shape.lower, shape.upper);
         Parameter { lower, upper, ..Parameter::fixed(name, shape.unit, nominal, Role::Effect, meaning) }
     }));
@@ -147,8 +147,8 @@ pub(crate) fn place(
 }
 
 /// Whether everything the spec says has a meaning for its kind.
-fn check_words(placing: &Placing<'_>) -> Result<(), String> {
-    let (spec, kind) = (placing.spec, placing.kind);
+fn check_words(context: &EffectContext<'_>) -> Result<(), String> {
+    let (spec, kind) = (context.spec, context.kind);
     if kind.target != super::Target::Joint && spec.target.is_some() {
         return Err("it does not act at a joint; leave the joint out".to_owned());
     }
@@ -162,7 +162,7 @@ fn check_words(placing: &Placing<'_>) -> Result<(), String> {
             return Err(format!("{name} = {value} is not within {} and {}", shape.lower, shape.upper));
         }
     }
-    match kind.shapes.iter().find(|shape| placing.shape(shape.name).is_none()) {
+    match kind.shapes.iter().find(|shape| context.shape(shape.name).is_none()) {
         Some(shape) => {
             Err(format!("say its {} ({}), such as {spec},{}=...", shape.name, shape.meaning, shape.name))
         }

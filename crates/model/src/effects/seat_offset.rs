@@ -38,8 +38,8 @@ struct SeatOffset {
     cavities: Vec<String>,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let cavities = placing.session.cavities.clone();
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let cavities = context.session.cavities.clone();
     if cavities.is_empty() {
         return Err("no observation is seated in the board".to_owned());
     }

@@ -33,7 +33,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     ..EffectKind::PLAIN
 };
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.turning_joint()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.turning_joint()?;
     Ok(Placement::new(amplitudes_wave(0.15, 3.0, " 2q"), Harmonic { joint, harmonic: 2.0 }))
 }

@@ -39,8 +39,8 @@ struct SensorScale {
     centre_m: Vector3<f64>,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let centre_m = placing.session.volume_centre_m.ok_or("no observation comes from a position sensor")?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let centre_m = context.session.volume_centre_m.ok_or("no observation comes from a position sensor")?;
     let amplitudes = amplitudes_xyz("", Unit::One, 0.004, 0.05, "relative error of scale along");
     Ok(Placement::distorting(amplitudes, SensorScale { centre_m }))
 }

@@ -8,10 +8,10 @@
 //! Nor does anything say where in its gap a joint rests that nothing presses onto a flank. Where the errors show that it
 //! rests there, how much of the gap it takes is part of the model, and of its noise.
 
+use super::context::EffectContext;
 use super::drivers::Drivers;
 use super::kind::Shape;
 use super::physics::{AnyPhysics, Deformation};
-use super::placing::Placing;
 use super::spec::EffectSpec;
 use armcal_core::{Observation, Parameter, Unit};
 use nalgebra::Vector3;
@@ -51,24 +51,24 @@ pub(super) const REST: Shape = Shape {
 };
 
 /// In a cavity a joint may rest within its play: less than all of it.
-fn led(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    worth_trying(placing, &[-1.0, -0.75, -0.5, 0.0, 0.5])
+fn led(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+    worth_trying(context, &[-1.0, -0.75, -0.5, 0.0, 0.5])
 }
 
-fn carried(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    worth_trying(placing, &[0.0])
+fn carried(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+    worth_trying(context, &[0.0])
 }
 
-fn worth_trying(placing: &Placing<'_>, shares: &[f64]) -> Vec<f64> {
-    if placing.session.seated_and_tracked() { shares.to_vec() } else { Vec::new() }
+fn worth_trying(context: &EffectContext<'_>, shares: &[f64]) -> Vec<f64> {
+    if context.session.seated_and_tracked() { shares.to_vec() } else { Vec::new() }
 }
 
 /// Whether a shape has a say: who holds the tip matters only where both do, or where somebody says that it does; where a
 /// joint rests, only where somebody says it.
-pub(super) fn matters(shape: &Shape, placing: &Placing<'_>) -> bool {
-    let said = placing.spec.shape.iter().any(|(name, _)| name == shape.name);
+pub(super) fn matters(shape: &Shape, context: &EffectContext<'_>) -> bool {
+    let said = context.spec.shape.iter().any(|(name, _)| name == shape.name);
     match shape.name {
-        name if name == SEATED.name => said || placing.session.seated_and_tracked(),
+        name if name == SEATED.name => said || context.session.seated_and_tracked(),
         name if name == REST.name => said,
         _ => true,
     }

@@ -32,10 +32,10 @@ pub struct EffectTable {
     pub kind: String,
     /// Its joint, or its marker.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub target: Option<Word>,
+    pub target: Option<JointReference>,
     /// When it acts: `1` or `"1.17"`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub since: Option<Word>,
+    pub since: Option<JointReference>,
     /// Name of an expression.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -50,7 +50,7 @@ pub struct EffectTable {
     pub one_of: Vec<String>,
     /// Shapes by their names, SI; any other key, which [`EffectTable::spec`] then names.
     #[serde(flatten)]
-    pub shape: BTreeMap<String, Word<f64>>,
+    pub shape: BTreeMap<String, JointReference<f64>>,
     /// Parameters of an expression, or changes to those of another kind.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Override>,
@@ -60,18 +60,18 @@ pub struct EffectTable {
 /// is not listed in [`EffectTable`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Word<N = usize> {
+pub enum JointReference<N = usize> {
     /// A number.
     Number(N),
     /// A word.
     Text(String),
 }
 
-impl std::fmt::Display for Word {
+impl std::fmt::Display for JointReference {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Word::Number(number) => write!(f, "{number}"),
-            Word::Text(text) => f.write_str(text),
+            JointReference::Number(number) => write!(f, "{number}"),
+            JointReference::Text(text) => f.write_str(text),
         }
     }
 }
@@ -144,7 +144,7 @@ impl EffectTable {
             None => None,
         };
         for (key, value) in &self.shape {
-            let Word::Number(value) = value else { return Err(bad(unknown_key(key))) };
+            let JointReference::Number(value) = value else { return Err(bad(unknown_key(key))) };
             spec.shape.push((key.clone(), *value));
         }
         spec.overrides = self.parameters.clone();
@@ -169,13 +169,21 @@ impl From<&EffectSpec> for EffectTable {
         let expression = spec.expression.as_ref();
         EffectTable {
             kind: spec.kind.clone(),
-            target: spec.marker.clone().map(Word::Text).or(spec.target.map(|joint| Word::Number(joint + 1))),
-            since: spec.since.map(|since| Word::Text(since.to_string())),
+            target: spec
+                .marker
+                .clone()
+                .map(JointReference::Text)
+                .or(spec.target.map(|joint| JointReference::Number(joint + 1))),
+            since: spec.since.map(|since| JointReference::Text(since.to_string())),
             name: expression.map(|e| e.name.clone()),
             formula: expression.map(|e| e.formula.clone()),
             acts_on: expression.map(|e| e.acts_on.clone()),
             one_of: Vec::new(),
-            shape: spec.shape.iter().map(|(key, value)| (key.clone(), Word::Number(*value))).collect(),
+            shape: spec
+                .shape
+                .iter()
+                .map(|(key, value)| (key.clone(), JointReference::Number(*value)))
+                .collect(),
             parameters: spec.overrides.clone(),
         }
     }

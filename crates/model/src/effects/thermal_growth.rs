@@ -38,15 +38,15 @@ struct ThermalGrowth {
     thermometer: bool,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let thermometer = placing.session.temperature;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let thermometer = context.session.temperature;
     let growth = if thermometer {
         amplitude("expansion", Unit::PerKelvin, 3e-5, 1e-3, "relative growth of every length per kelvin")
     } else {
-        placing.lasting()?;
+        context.lasting()?;
         amplitude("growth", Unit::One, 7e-4, 0.02, "relative growth of every length over the whole session")
     };
-    let lengths = placing.model.lengths_m();
+    let lengths = context.model.lengths_m();
     Ok(Placement::new(vec![growth], ThermalGrowth { lengths, thermometer }))
 }
 

@@ -43,10 +43,10 @@ pub(super) struct Moved {
     pub first: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    placing.event()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    context.event()?;
     let amplitudes = shift_xyz("shift on the last link along");
-    let first = placing.model.tip_segment(placing.arm()?).parameters.start;
+    let first = context.model.tip_segment(context.arm()?).parameters.start;
     Ok(Placement::new(amplitudes, Moved { first }))
 }
 

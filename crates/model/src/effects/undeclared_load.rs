@@ -46,12 +46,12 @@ struct UndeclaredLoad {
     joints: Vec<(usize, f64)>,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    placing.event()?;
-    let loaded = |joint: &usize| placing.motion(*joint) == Motion::Revolute && placing.loaded(*joint).is_ok();
-    let stretched = |joint| (joint, (placing.gravity_mps2() * placing.reach_m(joint)).max(1e-3));
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    context.event()?;
+    let loaded = |joint: &usize| context.motion(*joint) == Motion::Revolute && context.loaded(*joint).is_ok();
+    let stretched = |joint| (joint, (context.gravity_mps2() * context.reach_m(joint)).max(1e-3));
     let joints: Vec<(usize, f64)> =
-        placing.zero.joints_of(placing.arm()?).filter(loaded).map(stretched).collect();
+        context.zero.joints_of(context.arm()?).filter(loaded).map(stretched).collect();
     if joints.is_empty() {
         return Err("gravity loads none of the joints that turn".to_owned());
     }

@@ -47,9 +47,9 @@ struct UnsettledReading {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.joint()?;
-    if !placing.session.moved {
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.joint()?;
+    if !context.session.moved {
         return Err("no observation says where the joints rested before".to_owned());
     }
     let share =

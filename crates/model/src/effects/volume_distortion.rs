@@ -39,8 +39,8 @@ struct VolumeDistortion {
     per_extent: f64,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let centre_m = placing.session.volume_centre_m.ok_or("no observation comes from a position sensor")?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let centre_m = context.session.volume_centre_m.ok_or("no observation comes from a position sensor")?;
     let edge = amplitude("edge", Unit::Metre, 0.5e-3, 0.02, "outward error at the edge of the volume");
     let mut amplitudes = vec![edge];
     amplitudes.extend(amplitudes_xyz(
@@ -50,7 +50,7 @@ fn place(placing: &Placing<'_>) -> Result<Placement, String> {
         0.02,
         "distortion from a middle aside along",
     ));
-    let per_extent = 1.0 / placing.session.volume_half_extent_m;
+    let per_extent = 1.0 / context.session.volume_half_extent_m;
     Ok(Placement::distorting(amplitudes, VolumeDistortion { centre_m, per_extent }))
 }
 

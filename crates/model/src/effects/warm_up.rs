@@ -48,14 +48,14 @@ struct WarmUp {
     lengths: Vec<(usize, f64)>,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    placing.lasting()?;
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    context.lasting()?;
     let growth = amplitude("growth", Unit::One, 7e-4, 0.02, "relative growth of every length once warm");
-    Ok(Placement::new(vec![growth], WarmUp { lengths: placing.model.lengths_m() }))
+    Ok(Placement::new(vec![growth], WarmUp { lengths: context.model.lengths_m() }))
 }
 
-fn time_constants(placing: &Placing<'_>, _observations: &[Observation]) -> Vec<f64> {
-    let duration_s = placing.session.duration_s();
+fn time_constants(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+    let duration_s = context.session.duration_s();
     [0.05, 0.1, 0.2, 0.35, 0.6, 1.0].iter().map(|part| part * duration_s).collect()
 }
 

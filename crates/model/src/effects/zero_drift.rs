@@ -36,11 +36,11 @@ struct ZeroDrift {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.joint()?;
-    placing.lasting()?;
-    let (typical, bound) = (placing.joint_size(joint, 0.3), placing.joint_size(joint, 8.0));
-    let drift = amplitude("drift", placing.joint_unit(joint), typical, bound, "drift over the whole session");
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.joint()?;
+    context.lasting()?;
+    let (typical, bound) = (context.joint_size(joint, 0.3), context.joint_size(joint, 8.0));
+    let drift = amplitude("drift", context.joint_unit(joint), typical, bound, "drift over the whole session");
     Ok(Placement::new(vec![drift], ZeroDrift { joint }))
 }
 

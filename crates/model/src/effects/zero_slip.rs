@@ -40,11 +40,11 @@ struct ZeroSlip {
     joint: usize,
 }
 
-fn place(placing: &Placing<'_>) -> Result<Placement, String> {
-    let joint = placing.joint()?;
-    placing.event()?;
-    let (typical, bound) = (placing.joint_size(joint, 0.4), placing.joint_size(joint, 180.0));
-    let offset = amplitude("offset", placing.joint_unit(joint), typical, bound, "how far the zero slipped");
+fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+    let joint = context.joint()?;
+    context.event()?;
+    let (typical, bound) = (context.joint_size(joint, 0.4), context.joint_size(joint, 180.0));
+    let offset = amplitude("offset", context.joint_unit(joint), typical, bound, "how far the zero slipped");
     Ok(Placement::new(vec![offset], ZeroSlip { joint }))
 }
 

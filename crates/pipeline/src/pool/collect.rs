@@ -6,8 +6,8 @@ use armcal_config::{BoardPose, ClosedChainSection, ClosureKind, FramePose, Obser
 use armcal_core::{Against, Dwell, Observation, Pose, Severity, Stage, Warning};
 use armcal_recording::RecordingReport;
 use armcal_result::{
-    BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, PastObservations,
-    RecordingRun, StartFrame, also_in, sha256,
+    BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, RecordingRun, StartFrame,
+    StoredObservations, also_in, sha256,
 };
 use armcal_stages::RunError;
 use armcal_table::{Assignment, Association, Board, Place};
@@ -55,7 +55,7 @@ pub(super) fn collect(
     let facts = board.map(BoardFacts::of);
     let mut found = Vec::new();
     for result in results(folders)? {
-        let past = PastObservations::open(&result)?;
+        let past = StoredObservations::open(&result)?;
         if let Some(problem) = contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
             return Err(PoolError::Result { path: result, problem: format!("cannot be pooled: {problem}") });
         }
@@ -212,7 +212,7 @@ fn contradiction(
     pipeline: &Pipeline,
     model_sha256: &str,
     board: Option<&BoardFacts>,
-    past: &PastObservations,
+    past: &StoredObservations,
 ) -> Option<String> {
     if past.model_sha256 != model_sha256 {
         return Some("it calibrated another nominal arm (the model file differs); name its [model]".into());
@@ -347,7 +347,7 @@ fn unique_names(found: &[Found]) -> Vec<String> {
 }
 
 /// Why observations of a result cannot be pooled under this.
-fn joined_otherwise(closure: Option<&ClosedChainSection>, past: &PastObservations) -> Option<String> {
+fn joined_otherwise(closure: Option<&ClosedChainSection>, past: &StoredObservations) -> Option<String> {
     let all = past.recordings.iter().flat_map(|recording| &recording.observations);
     let joined = all.filter(|o| o.is_joined()).map(Observation::is_scalar);
     let said: BTreeSet<bool> = joined.collect();

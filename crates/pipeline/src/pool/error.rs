@@ -12,7 +12,7 @@ pub enum PoolError {
     Run(#[from] RunError),
     /// Reading back a result.
     #[error(transparent)]
-    PastRun(#[from] armcal_result::PastRunError),
+    StoredRun(#[from] armcal_result::StoredResultError),
     /// A result that cannot be used here, or a folder without any.
     #[error("{} {problem}", path.display())]
     Result { path: PathBuf, problem: String },

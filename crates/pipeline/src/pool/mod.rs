@@ -7,9 +7,9 @@ mod error;
 
 pub use error::PoolError;
 
+use crate::converged::run_of;
 use crate::diagnosed::diagnose_again;
 use crate::refits::add_refits;
-use crate::settled::run_of;
 use armcal_calibrate::{FitConfig, HoldoutConfig, align_frames, calibrate};
 use armcal_config::{BoardPose, FramePose, Pipeline};
 use armcal_core::Pose;

@@ -1,8 +1,8 @@
 //! A campaign for programs, and its page.
 
+use super::describe::{meaning, repeated, sentence};
 use super::page::CampaignPage;
 use super::story::conclusion;
-use super::words::{meaning, repeated, sentence};
 use crate::ReportError;
 use crate::tables::Columns;
 use crate::write::{commit_all, stage, stage_pieces};

@@ -4,12 +4,12 @@
 //! where a recording was worked on.
 
 mod date;
+mod describe;
 mod files;
 mod page;
 mod row;
 mod story;
 mod terminal;
-mod words;
 
 pub use files::{campaign_files, campaign_json, write_campaign};
 pub use row::campaign_row;

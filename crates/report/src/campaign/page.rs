@@ -1,7 +1,7 @@
 //! The page of a campaign: errors over time, every change with its series, every recording.
 
+use super::describe::{self, meaning, repeated, sentence};
 use super::story::campaign_story;
-use super::words::{self, meaning, repeated, sentence};
 use crate::ReportError;
 use crate::page::embed;
 use crate::page::shell::Shell;

@@ -1,6 +1,6 @@
 //! What a campaign comes to: how many, how well, what is wrong, what to do next.
 
-use super::words::{meaning, sentence};
+use super::describe::{meaning, sentence};
 use armcal_campaign::{ErrorFigures, Row, Status};
 use armcal_core::units::millimetres;
 use armcal_core::{Severity, listed, printable};

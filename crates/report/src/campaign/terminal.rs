@@ -1,7 +1,7 @@
 //! A campaign for people, at most 100 columns wide.
 
+use super::describe::{cells, meaning, repeated, sentence};
 use super::story::campaign_story;
-use super::words::{cells, meaning, repeated, sentence};
 use crate::pen::{Pen, TerminalStyle, number};
 use crate::terminal::{Detail, Shown, ending};
 use armcal_campaign::Row;

@@ -4,7 +4,7 @@ use super::embed;
 use super::shell::Shell;
 use crate::ReportError;
 use crate::comparison::{comparison_sentence, difference_shown, moved_shown};
-use armcal_result::{Comparison, Difference, PastRun, paired};
+use armcal_result::{Comparison, Difference, StoredRun, paired};
 use askama::Template;
 use serde_json::{Value, json};
 
@@ -13,8 +13,8 @@ use serde_json::{Value, json};
 /// # Errors
 /// A template or document that cannot be written.
 pub fn comparison_html(
-    before: &PastRun,
-    after: &PastRun,
+    before: &StoredRun,
+    after: &StoredRun,
     comparison: &Comparison,
 ) -> Result<String, ReportError> {
     let with = |name: &str, effects: &[String]| match effects.is_empty() {
@@ -38,7 +38,7 @@ struct ComparePage<'a> {
 }
 
 /// What the page's scripts draw.
-fn document(before: &PastRun, after: &PastRun, comparison: &Comparison) -> Value {
+fn document(before: &StoredRun, after: &StoredRun, comparison: &Comparison) -> Value {
     let pairs = paired(before, after).pairs;
     let mut recordings: Vec<&str> = Vec::new();
     let rows = pairs.iter().map(|(earlier, r)| {

@@ -4,8 +4,8 @@ use super::shown::{Shown, drawn_drivers, effect_names};
 use crate::findings::unlisted_curves;
 use armcal_diagnose::{CandidateReport, Diagnosis};
 use armcal_model::find;
-use armcal_result::levers::{Basis, Channel, Driver};
 use armcal_result::proto::ErrorCurve;
+use armcal_result::sensitivity::{Basis, Channel, Driver};
 use armcal_result::{Column, RecordingNames, Refit, Run};
 use armcal_wording::{channel_told, driver_told, sizes};
 use serde::Serialize;
@@ -75,7 +75,7 @@ impl Document {
         let candidates =
             run.diagnosis.iter().flat_map(|d| ranking(d, &run.recording_names(), &index_of)).collect();
         Document {
-            channels: basis.levers.channels.clone(),
+            channels: basis.sensitivity.channels.clone(),
             drawn: drawn_drivers(basis),
             drivers: basis.drivers.clone(),
             arrival: basis.arrival.clone(),

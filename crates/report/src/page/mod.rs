@@ -3,7 +3,7 @@
 //! The numbers are worked out here and embedded as one JSON document; the page's scripts only draw. The page that is
 //! opened from disk and the one that is served are the same; the served one may ask for refits.
 //!
-//! * [`Basis`]: what all refits share, with `levers` (implied errors of joints and lengths);
+//! * [`Basis`]: what all refits share, with `sensitivity` (implied errors of joints and lengths);
 //! * `shown`: one calibration as it is drawn, with `bands`, `groups`, `signature`;
 //! * `document`: all of it as one value; `embed`: how it gets into the page; `quality`: the tables about the data;
 //! * `shell`: what all pages have in common; `compared`: that of
@@ -24,7 +24,7 @@ use armcal_core::ErrorStats;
 use armcal_core::units::millimetres;
 use armcal_diagnose::{FoundEffect, NotTestable};
 use armcal_result::by_marker::{MarkerErrors, by_marker};
-use armcal_result::levers::Basis;
+use armcal_result::sensitivity::Basis;
 use armcal_result::summary::Explanation;
 use armcal_result::{Refit, Run};
 use armcal_wording::{

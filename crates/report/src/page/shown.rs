@@ -4,7 +4,7 @@ use armcal_calibrate::{Calibration, Estimate, PairedDifference, SideErrors};
 use armcal_core::ErrorStats;
 use armcal_core::units::millimetres;
 use armcal_model::Model;
-use armcal_result::levers::{Band, Basis, Group, Signature, bands, drivers_of, groups, signatures};
+use armcal_result::sensitivity::{Band, Basis, Group, Signature, bands, drivers_of, groups, signatures};
 use armcal_result::{Column, Refit, Run, role_word};
 use armcal_wording::{conclusion, estimate_shown, pool_story};
 use nalgebra::Vector3;
@@ -69,11 +69,11 @@ impl Shown {
         let judged = calibration.residuals.iter().zip(&error_mm);
         let judged: Vec<Option<f64>> =
             judged.map(|(r, e)| (r.held_out || !any_held_out).then_some(*e)).collect();
-        let channels = basis.levers.channels.len();
+        let channels = basis.sensitivity.channels.len();
         let drawn: Vec<usize> =
-            (0..channels).filter(|c| !basis.levers.channels[*c].key.starts_with("world")).collect();
+            (0..channels).filter(|c| !basis.sensitivity.channels[*c].key.starts_with("world")).collect();
         let implied: Vec<Vec<Option<f64>>> =
-            drawn.iter().map(|c| basis.levers.implied(*c, &residuals_m)).collect();
+            drawn.iter().map(|c| basis.sensitivity.implied(*c, &residuals_m)).collect();
         let in_board = |axis: usize| {
             let each = residuals_m.iter().zip(&basis.into_board);
             Column::of(each.map(|(r, turn)| turn.as_ref().map(|turn| (turn * r)[axis] * 1e3)))
@@ -102,7 +102,7 @@ impl Shown {
 
 /// Drivers drawn for each channel that has implied errors on the page.
 pub(crate) fn drawn_drivers(basis: &Basis) -> Vec<Vec<String>> {
-    let drawn = basis.levers.channels.iter().take_while(|c| !c.key.starts_with("world"));
+    let drawn = basis.sensitivity.channels.iter().take_while(|c| !c.key.starts_with("world"));
     drawn.enumerate().map(|(c, _)| drivers_of(basis, c)).collect()
 }
 

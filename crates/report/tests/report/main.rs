@@ -30,10 +30,10 @@ mod page;
 mod tables;
 
 /// `observations.json`: what the fit saw comes back to the last bit.
-mod past_observations;
+mod stored_observations;
 
 /// `model.json`: the calibrated model comes back as it was.
-mod past_model;
+mod stored_model;
 
 /// What a person reads.
 mod terminal;

@@ -4,7 +4,7 @@ use crate::synthetic::{HOSTILE, synthetic};
 use armcal_core::DwellId;
 use armcal_report::{PageKind, report_html, summary_json};
 use armcal_result::Refit;
-use armcal_result::levers::Basis;
+use armcal_result::sensitivity::Basis;
 use serde_json::Value;
 
 const DATA: &str = "<script type=\"application/json\" id=\"data\">";

@@ -7,7 +7,7 @@ use armcal_config::InputMessages;
 use armcal_core::{Severity, Stage, Warning};
 use armcal_report::{Detail, PageKind, TerminalStyle, report_html, summary_json, terminal};
 use armcal_result::Status;
-use armcal_result::levers::Basis;
+use armcal_result::sensitivity::Basis;
 
 /// Text without line breaks, indents and markup of characters.
 fn flat(text: &str) -> String {

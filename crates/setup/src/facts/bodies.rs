@@ -5,7 +5,7 @@ use crate::beyond::apart;
 use armcal_core::{Dwell, SetupFinding};
 use armcal_dwell::MeanPose;
 use armcal_stages::still::still_tip;
-use armcal_stages::{Inputs, Seen};
+use armcal_stages::{Inputs, RecordingData};
 
 /// The tip's path is long against this where an arm moves [m].
 const MOVES_M: f64 = 0.05;
@@ -17,7 +17,7 @@ const SAME_RAD: f64 = 5e-3;
 /// never filled in. A base or table that is published as a constant may stand so.
 pub fn no_quaternion(inputs: &Inputs) -> Vec<SetupFinding> {
     let unturned = |angle_rad: f64| angle_rad < 1e-12;
-    let body = |of: fn(&Seen) -> &Option<MeanPose>| {
+    let body = |of: fn(&RecordingData) -> &Option<MeanPose>| {
         let mut poses = inputs.seen.iter().filter_map(|s| of(s).as_ref()).peekable();
         poses.peek().is_some() && poses.all(|p| p.has_orientation && unturned(p.pose.rotation.angle()))
     };
@@ -87,7 +87,7 @@ pub fn moving(inputs: &Inputs) -> Vec<SetupFinding> {
 
 /// Base and table that are one body in every recording.
 pub fn same_body(inputs: &Inputs) -> Option<SetupFinding> {
-    let of = |s: &Seen| Some(apart(&s.base.as_ref()?.pose, &s.table.as_ref()?.pose));
+    let of = |s: &RecordingData| Some(apart(&s.base.as_ref()?.pose, &s.table.as_ref()?.pose));
     let all: Option<Vec<(f64, f64)>> = inputs.seen.iter().map(of).collect();
     let all =
         all.filter(|all| !all.is_empty() && all.iter().all(|(m, rad)| *m < SAME_M && *rad < SAME_RAD))?;

@@ -3,7 +3,7 @@
 use super::{mistake, possible};
 use armcal_core::{Dwell, SetupFinding};
 use armcal_stages::still::{TURNS_RAD, spread};
-use armcal_stages::{Inputs, Seen};
+use armcal_stages::{Inputs, RecordingData};
 
 /// Readings that end within this of each other end at one value [rad].
 const ONE_END_RAD: f64 = 2e-4;
@@ -67,7 +67,7 @@ fn steps_of(sorted: &[f64]) -> bool {
 
 /// Stamps of the joints that no clock gives.
 pub fn stamps(inputs: &Inputs) -> Vec<SetupFinding> {
-    let of = |s: &Seen| {
+    let of = |s: &RecordingData| {
         let why = s.readings.stamps.as_ref()?;
         let message = format!("{why}; mend what stamps them, or set `clock = \"log\"` in [streams.joints]");
         Some(mistake("stamps-wrong", format!("recording `{}`", s.name), message))

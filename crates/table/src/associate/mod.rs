@@ -30,7 +30,7 @@ use crate::{Association, AssociationConfig, Board, TableError};
 use armcal_core::{DwellId, Pose};
 use nalgebra::Vector3;
 use problem::Problem;
-use refine::{Explanation, Settled, finish, settle};
+use refine::{Converged, Explanation, finish, settle};
 
 /// Explanations whose shifts by one cavity are looked at, at most.
 const SHIFTED: usize = 4;
@@ -119,7 +119,7 @@ fn explain(problem: &Problem, start: &BoardStart) -> Vec<Explanation> {
 }
 
 /// Finishes the alignments that the order of visits could still make the best.
-fn weigh(problem: &Problem, settled: Vec<Settled>, explanations: &mut Vec<Explanation>) {
+fn weigh(problem: &Problem, settled: Vec<Converged>, explanations: &mut Vec<Explanation>) {
     let top = settled.iter().map(|s| s.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let by_order = NEGLIGIBLE_LN + ORDER_WORTH_LN * problem.weight.iter().sum::<f64>();
     for candidate in settled {

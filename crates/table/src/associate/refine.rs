@@ -33,7 +33,7 @@ pub(super) struct Explanation {
 }
 
 /// An alignment refined dwell by dwell, before the order of visits is asked.
-pub(super) struct Settled {
+pub(super) struct Converged {
     pub field: Field,
     pub sigma_m: f64,
     pub normal_known: bool,
@@ -42,7 +42,7 @@ pub(super) struct Settled {
 }
 
 /// Refines `field`, starting with a scatter of `sigma_m`.
-pub(super) fn settle(problem: &Problem, mut field: Field, sigma_m: f64) -> Settled {
+pub(super) fn settle(problem: &Problem, mut field: Field, sigma_m: f64) -> Converged {
     let mut sigma_m = sigma_m;
     let mut normal_known = !problem.free_pose || problem.layout.len() > 2;
     let fall = (tip_sigma_m(problem) / sigma_m).min(1.0).powf(1.0 / FALLING as f64);
@@ -62,12 +62,12 @@ pub(super) fn settle(problem: &Problem, mut field: Field, sigma_m: f64) -> Settl
     }
     let ln_likelihood = expect(problem, &field, sigma_m, normal_known, &mut soft);
     let ln_posterior = ln_likelihood + ln_prior(problem, &field, sigma_m);
-    Settled { field, sigma_m, normal_known, ln_posterior }
+    Converged { field, sigma_m, normal_known, ln_posterior }
 }
 
 /// Takes the order of visits into account.
-pub(super) fn finish(problem: &Problem, settled: Settled) -> Explanation {
-    let Settled { mut field, mut sigma_m, normal_known, .. } = settled;
+pub(super) fn finish(problem: &Problem, settled: Converged) -> Explanation {
+    let Converged { mut field, mut sigma_m, normal_known, .. } = settled;
     let mut stay = problem.stay;
     for _ in 0..FINAL {
         let sequence = Sequence::of(problem, &field, &Emission::new(problem, sigma_m, normal_known), stay);

@@ -30,7 +30,7 @@ pub(crate) const ARM: Shape = Shape {
 };
 
 /// One spec about to be placed.
-pub(crate) struct Placing<'a> {
+pub(crate) struct EffectContext<'a> {
     /// The model it joins.
     pub model: &'a Model,
     /// The observations it will explain.
@@ -43,7 +43,7 @@ pub(crate) struct Placing<'a> {
     pub zero: &'a NominalPose,
 }
 
-impl Placing<'_> {
+impl EffectContext<'_> {
     /// The joint the spec names.
     pub fn joint(&self) -> Result<usize, String> {
         let joint = self

@@ -19,7 +19,7 @@ pub const SUMMARY: &str = "summary.json";
 
 /// Results of an earlier run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PastRun {
+pub struct StoredRun {
     /// The file; empty for a run that has not been written.
     pub path: PathBuf,
     /// Name of its pipeline.
@@ -27,9 +27,9 @@ pub struct PastRun {
     /// Physical effects of its model beyond geometry.
     pub effects: Vec<String>,
     /// The recordings, by their index.
-    pub recordings: Vec<PastRecording>,
+    pub recordings: Vec<StoredRecording>,
     /// One entry an observation, in the order of the file.
-    pub residuals: Vec<PastResidual>,
+    pub residuals: Vec<StoredResidual>,
     /// All parameters, free and fixed.
     pub parameters: Vec<proto::Parameter>,
     /// Its `summary.json`; null for a run that has not been written.
@@ -38,18 +38,18 @@ pub struct PastRun {
 
 /// A recording that was calibrated on.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct PastRecording {
+pub struct StoredRecording {
     /// Its name.
     pub name: String,
     /// What its files hold, as hashes.
     pub identities: Vec<String>,
     /// Its dwells, used or not.
-    pub dwells: Vec<PastDwell>,
+    pub dwells: Vec<StoredDwell>,
 }
 
 /// When a dwell was, and what it is recognised by.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PastDwell {
+pub struct StoredDwell {
     /// Index in its recording.
     pub index: usize,
     /// Its beginning [ns], robot clock.
@@ -62,7 +62,7 @@ pub struct PastDwell {
 
 /// The error of one observation after calibration.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PastResidual {
+pub struct StoredResidual {
     /// Name of the recording.
     pub recording: String,
     /// Its dwell.
@@ -80,7 +80,7 @@ pub struct PastResidual {
 /// Why a result cannot be read back.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each message says what its fields are")]
-pub enum PastRunError {
+pub enum StoredResultError {
     /// The file is not there or not an MCAP.
     #[error("reading the result {}: {source}", path.display())]
     Open { path: PathBuf, source: Box<RecordingError> },
@@ -109,10 +109,13 @@ pub enum PastRunError {
 }
 
 /// The text of a file of a result; `absent` says what it means that it is not there.
-pub fn past_text(path: &Path, absent: impl FnOnce(String) -> PastRunError) -> Result<String, PastRunError> {
+pub fn stored_text(
+    path: &Path,
+    absent: impl FnOnce(String) -> StoredResultError,
+) -> Result<String, StoredResultError> {
     input::read_to_string(path, input::Kind::Data).map_err(|source| match source.kind() {
         ErrorKind::NotFound => absent(source.to_string()),
-        _ => PastRunError::Unreadable { path: path.to_owned(), source },
+        _ => StoredResultError::Unreadable { path: path.to_owned(), source },
     })
 }
 
@@ -122,8 +125,8 @@ pub fn run_file(path: &Path) -> PathBuf {
 }
 
 /// The text that armcal attached to a `run.mcap` by this name.
-pub fn attachment(path: &Path, name: &str) -> Result<Option<String>, PastRunError> {
-    let at = |source| PastRunError::Open { path: path.to_owned(), source: Box::new(source) };
+pub fn attachment(path: &Path, name: &str) -> Result<Option<String>, StoredResultError> {
+    let at = |source| StoredResultError::Open { path: path.to_owned(), source: Box::new(source) };
     let recording = Recording::open(&[path.to_owned()]).map_err(at)?;
     attached(&recording, name).map_err(at)
 }
@@ -140,10 +143,10 @@ fn attached(recording: &Recording, name: &str) -> Result<Option<String>, Recordi
     Ok(found)
 }
 
-impl PastRun {
+impl StoredRun {
     /// A run that has just finished, as it would be read back.
-    pub fn of(run: &Run) -> PastRun {
-        let residual = |(o, r): (&Observation, &Residual)| PastResidual {
+    pub fn of(run: &Run) -> StoredRun {
+        let residual = |(o, r): (&Observation, &Residual)| StoredResidual {
             recording: run.recording_name(r.dwell).to_owned(),
             dwell: r.dwell,
             cavity: o.cavity().unwrap_or_default().to_owned(),
@@ -151,12 +154,12 @@ impl PastRun {
             held_out: r.held_out,
             error_m: r.fitted_m.norm(),
         };
-        let recording = |r: &RecordingRun| PastRecording {
+        let recording = |r: &RecordingRun| StoredRecording {
             name: r.name.clone(),
             identities: r.files().into_iter().map(|f| f.identity).collect(),
-            dwells: r.dwells.iter().map(PastDwell::of).collect(),
+            dwells: r.dwells.iter().map(StoredDwell::of).collect(),
         };
-        PastRun {
+        StoredRun {
             recordings: run.recordings.iter().map(recording).collect(),
             path: PathBuf::new(),
             pipeline: run.pipeline_name.clone(),
@@ -168,9 +171,9 @@ impl PastRun {
     }
 
     /// Reads `run.mcap`, given itself or the folder it is in.
-    pub fn open(path: &Path) -> Result<PastRun, PastRunError> {
+    pub fn open(path: &Path) -> Result<StoredRun, StoredResultError> {
         let path = run_file(path);
-        let at = |source| PastRunError::Open { path: path.clone(), source: Box::new(source) };
+        let at = |source| StoredResultError::Open { path: path.clone(), source: Box::new(source) };
         let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
         let mut residuals = Vec::new();
         let mut dwells = Vec::new();
@@ -188,18 +191,18 @@ impl PastRun {
             Ok(())
         };
         recording.for_each_raw(each).map_err(at)?;
-        let missing = |topic| PastRunError::NoResults { path: path.clone(), topic };
+        let missing = |topic| StoredResultError::NoResults { path: path.clone(), topic };
         let report = report.ok_or_else(|| missing("/armcal/report"))?;
         if residuals.is_empty() {
             return Err(missing("/armcal/residuals"));
         }
         let summary = attached(&recording, SUMMARY).map_err(at)?;
         let inputs = recording.metadata().map_err(at)?;
-        Ok(PastRun {
+        Ok(StoredRun {
             recordings: recordings(&inputs, &dwells),
             pipeline: report.pipeline,
             effects: report.effects,
-            residuals: residuals.into_iter().map(PastResidual::from).collect(),
+            residuals: residuals.into_iter().map(StoredResidual::from).collect(),
             parameters: parameters.into_iter().flat_map(|p| p.parameters).collect(),
             summary: summary.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default(),
             path,
@@ -208,15 +211,15 @@ impl PastRun {
 }
 
 /// The recordings, put together from the names and hashes of the input and the dwells.
-fn recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<PastRecording> {
-    let mut found: BTreeMap<usize, PastRecording> = BTreeMap::new();
+fn recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<StoredRecording> {
+    let mut found: BTreeMap<usize, StoredRecording> = BTreeMap::new();
     let inputs = metadata.iter().filter(|(name, _)| name == INPUT_METADATA).flat_map(|(_, entries)| entries);
     for (key, value) in inputs {
         let Some((index, fact)) = key.strip_prefix("recording").and_then(|key| key.split_once('.')) else {
             continue;
         };
         let Ok(index) = index.parse() else { continue };
-        let recording: &mut PastRecording = found.entry(index).or_default();
+        let recording: &mut StoredRecording = found.entry(index).or_default();
         match fact {
             "name" => recording.name.clone_from(value),
             // Earlier versions wrote a SHA-256.
@@ -229,32 +232,32 @@ fn recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<PastReco
     for d in dwells {
         let recording = found.entry(d.recording_index as usize).or_default();
         recording.name.clone_from(&d.recording);
-        recording.dwells.extend(PastDwell::read(d));
+        recording.dwells.extend(StoredDwell::read(d));
     }
     let count = found.keys().next_back().map_or(0, |last| last + 1);
     (0..count).map(|index| found.remove(&index).unwrap_or_default()).collect()
 }
 
-impl PastDwell {
-    fn of(d: &Dwell) -> PastDwell {
+impl StoredDwell {
+    fn of(d: &Dwell) -> StoredDwell {
         let mark = DwellMark::of(d.mid_ns(), &d.joint_rad);
-        PastDwell { index: d.id.dwell, start_ns: d.start_ns, end_ns: d.end_ns, mark }
+        StoredDwell { index: d.id.dwell, start_ns: d.start_ns, end_ns: d.end_ns, mark }
     }
 
     /// None where a time is missing.
-    fn read(d: &proto::Dwell) -> Option<PastDwell> {
+    fn read(d: &proto::Dwell) -> Option<StoredDwell> {
         let ns = |t: &Option<prost_types::Timestamp>| {
             let t = t.as_ref()?;
             t.seconds.checked_mul(1_000_000_000)?.checked_add(i64::from(t.nanos))
         };
         let mark = DwellMark::of(ns(&d.timestamp)?, &d.joint_rad);
-        Some(PastDwell { index: d.dwell as usize, start_ns: ns(&d.start)?, end_ns: ns(&d.end)?, mark })
+        Some(StoredDwell { index: d.dwell as usize, start_ns: ns(&d.start)?, end_ns: ns(&d.end)?, mark })
     }
 }
 
-impl From<proto::Residual> for PastResidual {
-    fn from(r: proto::Residual) -> PastResidual {
-        PastResidual {
+impl From<proto::Residual> for StoredResidual {
+    fn from(r: proto::Residual) -> StoredResidual {
+        StoredResidual {
             recording: r.recording,
             dwell: DwellId { recording: r.recording_index as usize, dwell: r.dwell as usize },
             cavity: r.cavity,

@@ -1,8 +1,8 @@
 //! Gravity torque with unknown masses: one amplitude for the links, one more for the share of the outer links,
 //! one for the load.
 
+use super::context::{EffectContext, amplitude};
 use super::drivers::Torque;
-use super::placing::{Placing, amplitude};
 use crate::rigid::Scalar;
 use armcal_core::{Parameter, Unit};
 
@@ -11,15 +11,15 @@ const OUTER_SHARE: f64 = 0.5;
 
 /// Which shares of the torque have amplitudes of their own, in this order: links, outer, load.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shares {
+pub(crate) struct TorqueTerms {
     outer: bool,
     load: bool,
 }
 
-impl Shares {
+impl TorqueTerms {
     /// The shares of a joint: the outer links where there are any, the load where the session has one.
-    pub fn of(placing: &Placing<'_>, joint: usize) -> Shares {
-        Shares { outer: !placing.zero.outer(joint).is_empty(), load: placing.session.load }
+    pub fn of(context: &EffectContext<'_>, joint: usize) -> TorqueTerms {
+        TorqueTerms { outer: !context.zero.outer(joint).is_empty(), load: context.session.load }
     }
 
     /// The amplitudes: `quantity`, `quantity_outer`, `quantity_load`.
@@ -62,7 +62,7 @@ impl Shares {
         sum
     }
 
-    /// [`Shares::sum`] of a torque.
+    /// [`TorqueTerms::sum`] of a torque.
     pub fn torque<D: Scalar>(self, theta: &[D], torque: &Torque) -> D {
         self.sum(theta, torque.links_nm, torque.outer_nm, torque.load_nm)
     }

@@ -2,7 +2,7 @@ use crate::synthetic::synthetic;
 use armcal_config::OutputConfig;
 use armcal_core::{Observation, Reference};
 use armcal_report::write_all;
-use armcal_result::{BoardFacts, OBSERVATIONS_FILE, PastObservations, observations_json, open_model};
+use armcal_result::{BoardFacts, OBSERVATIONS_FILE, StoredObservations, observations_json, open_model};
 
 #[test]
 fn what_a_fit_saw_comes_back_to_the_last_bit() {
@@ -17,7 +17,7 @@ fn what_a_fit_saw_comes_back_to_the_last_bit() {
     assert!(s.run.observations.iter().any(|o| o.cavity().is_none()));
     let out = s.folder.path().join("out");
     write_all(&s.run, &s.recordings, &out, &OutputConfig::default()).unwrap();
-    let past = PastObservations::open(&out.join(OBSERVATIONS_FILE)).unwrap();
+    let past = StoredObservations::open(&out.join(OBSERVATIONS_FILE)).unwrap();
 
     let found: Vec<Observation> = past.recordings.iter().flat_map(|r| r.observations.clone()).collect();
     let mut wanted = s.run.observations.clone();
@@ -44,9 +44,9 @@ fn what_a_fit_saw_comes_back_to_the_last_bit() {
         assert!(text.contains("\"identity\":") && !text.contains("\"sha256\":"), "{file}");
         std::fs::write(earlier.join(file), text.replace("\"identity\":", "\"sha256\":")).unwrap();
     }
-    let before = PastObservations::open(&earlier.join(OBSERVATIONS_FILE)).unwrap();
+    let before = StoredObservations::open(&earlier.join(OBSERVATIONS_FILE)).unwrap();
     let files =
-        |past: &PastObservations| past.recordings.iter().flat_map(|r| r.files.clone()).collect::<Vec<_>>();
+        |past: &StoredObservations| past.recordings.iter().flat_map(|r| r.files.clone()).collect::<Vec<_>>();
     assert_eq!(files(&before), files(&past));
     let files = |folder: &std::path::Path| open_model(folder).unwrap().recordings[0].identity.clone();
     assert_eq!(files(&earlier), files(&out));
@@ -61,7 +61,7 @@ fn observations_that_contradict_themselves_are_refused() {
         let mut value = whole.clone();
         edit(&mut value);
         std::fs::write(&path, value.to_string()).unwrap();
-        PastObservations::open(&path).unwrap_err().to_string()
+        StoredObservations::open(&path).unwrap_err().to_string()
     };
     let first = "/recordings/0/observations/0";
     let short = refused(&|v| v.pointer_mut(first).unwrap()["arrival"] = serde_json::json!([]));
@@ -72,5 +72,5 @@ fn observations_that_contradict_themselves_are_refused() {
     assert!(other.contains("armcal.observations/2"), "{other}");
     let number = refused(&|v| v.pointer_mut(first).unwrap()["time_ns"] = "noon".into());
     assert!(number.contains("noon"), "{number}");
-    assert!(PastObservations::open(s.folder.path()).is_err());
+    assert!(StoredObservations::open(s.folder.path()).is_err());
 }

@@ -12,14 +12,14 @@ use armcal_model::{EffectSpec, Model, catalogue};
 use armcal_pipeline::Pooled;
 use armcal_recording::atomic;
 use armcal_report::{PageKind, refit_json, report_html};
-use armcal_result::levers::Basis;
+use armcal_result::sensitivity::Basis;
 use armcal_result::{Refit, Run};
 use armcal_stages::frames;
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// A finished run, ready to be refitted.
-pub struct Bench {
+pub struct RefitSession {
     pipeline: Pipeline,
     path: PathBuf,
     /// The arm without effects.
@@ -30,9 +30,9 @@ pub struct Bench {
     basis: Basis,
 }
 
-impl Bench {
+impl RefitSession {
     /// Runs a pipeline, or pools `results` with it; what comes of it stays in memory.
-    pub fn of(given: Given, progress: &Progress) -> Result<Bench, Error> {
+    pub fn of(given: Given, progress: &Progress) -> Result<RefitSession, Error> {
         let Given { pipeline: path, results, concluded } = given;
         let (pipeline, geometry, run) = match &results[..] {
             [] => {
@@ -51,7 +51,7 @@ impl Bench {
         };
         let own = frames::effect_specs(&pipeline, &geometry)?;
         let basis = Basis::of(&run);
-        Ok(Bench { pipeline, path, geometry, own, run, basis })
+        Ok(RefitSession { pipeline, path, geometry, own, run, basis })
     }
 
     /// The run.

@@ -1,7 +1,7 @@
 //! An effect by itself: what the fitted model says it does, and what the measurements say without it.
 //!
 //! ```text
-//! d = r(effect at zero) - r(all),   y = lever . (r + d),   line = lever . d
+//! d = r(effect at zero) - r(all),   y = sensitivity . (r + d),   line = sensitivity . d
 //! ```
 //!
 //! with everything else as fitted beside the effect (a component-plus-residual plot: Cook, Technometrics 35, 1993). Geometry
@@ -67,7 +67,7 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
     let scalars = run.observations.iter().filter(|o| o.is_scalar()).count();
     let preference = if 2 * scalars > run.observations.len() { 1.0 } else { PREFERENCE };
     let (channel, share) = channel(basis, &difference_m, (effect.spec.target, preference))?;
-    let effect_is = basis.levers.implied(channel, &difference_m);
+    let effect_is = basis.sensitivity.implied(channel, &difference_m);
     let driver = match effect.spec.since {
         // What else changed at that moment, the temperature for one, is no cause of an event.
         Some(_) => basis.driver("time"),
@@ -75,7 +75,7 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
     }?;
     let residuals = refit.calibration.residuals.iter().zip(&difference_m);
     let partial_m: Vec<Vector3<f64>> = residuals.map(|(r, d)| r.fitted_m + d).collect();
-    let measured = basis.levers.implied(channel, &partial_m);
+    let measured = basis.sensitivity.implied(channel, &partial_m);
     let key = &basis.drivers[driver].key;
     Some(Signature {
         effect: effect.spec.to_string(),
@@ -105,7 +105,7 @@ fn channel(
     (target, preference): (Option<usize>, f64),
 ) -> Option<(usize, f64)> {
     let shares: Vec<f64> =
-        (0..basis.levers.channels.len()).map(|c| basis.levers.share(c, difference_m)).collect();
+        (0..basis.sensitivity.channels.len()).map(|c| basis.sensitivity.share(c, difference_m)).collect();
     let best = (0..shares.len()).max_by(|a, b| shares[*a].total_cmp(&shares[*b]))?;
     let chosen = target.filter(|own| shares[*own] > shares[best] - preference).unwrap_or(best);
     Some((chosen, shares[chosen]))
@@ -114,7 +114,7 @@ fn channel(
 /// The driver over which the effect scatters least within a bin and a direction of arrival; what gives way is looked at over
 /// torque first.
 fn driver(basis: &Basis, channel: usize, family: Family, effect: &[Option<f64>]) -> Option<usize> {
-    let joint = basis.levers.channels[channel].joint;
+    let joint = basis.sensitivity.channels[channel].joint;
     let own = |key: &str| joint.and_then(|j| basis.driver(&format!("{key}{}", j + 1)));
     let [one, other] = if family == Family::Elasticity { ["tau", "q"] } else { ["q", "tau"] };
     let first = [own(one), own(other), basis.driver("temperature"), basis.driver("time")];

@@ -1,11 +1,11 @@
 //! `observations.json`: what a fit saw, so that it can be seen again together with other recordings.
 //!
-//! [`observations_json`] of a run, [`PastObservations::open`] from its results. Every number comes back as it was.
+//! [`observations_json`] of a run, [`StoredObservations::open`] from its results. Every number comes back as it was.
 
 use crate::files::{ObservedFile, sha256};
-use crate::past::past_text;
 use crate::run::{RecordingRun, Run, VERSION};
-use crate::{DwellMark, PastRunError, ResultError};
+use crate::stored::stored_text;
+use crate::{DwellMark, ResultError, StoredResultError};
 use armcal_core::{Observation, Parameter, Pose, Role, Severity};
 use armcal_model::Session;
 use armcal_table::Board;
@@ -20,7 +20,7 @@ pub const OBSERVATIONS_FILE: &str = "observations.json";
 
 /// What an earlier fit saw.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct PastObservations {
+pub struct StoredObservations {
     schema: String,
     version: String,
     /// Name of the pipeline.
@@ -97,7 +97,7 @@ struct CavityFacts {
 pub fn observations_json(run: &Run) -> Result<String, ResultError> {
     let pipeline = run.pipeline_text.parse::<toml::Table>().unwrap_or_default();
     let settings = pipeline.get("observations").and_then(toml::Value::as_table).cloned().unwrap_or_default();
-    let past = PastObservations {
+    let past = StoredObservations {
         schema: SCHEMA.into(),
         version: VERSION.into(),
         pipeline: run.pipeline_name.clone(),
@@ -110,15 +110,15 @@ pub fn observations_json(run: &Run) -> Result<String, ResultError> {
     Ok(serde_json::to_string(&past).map_err(ResultError::Json)? + "\n")
 }
 
-impl PastObservations {
+impl StoredObservations {
     /// Reads the `observations.json` at `path`.
     ///
     /// # Errors
     /// A file that cannot be read, is of another format, or contradicts itself.
-    pub fn open(path: &Path) -> Result<PastObservations, PastRunError> {
-        let bad = |why: String| PastRunError::BadObservations { path: path.to_owned(), why };
-        let text = past_text(path, bad)?;
-        let past: PastObservations = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
+    pub fn open(path: &Path) -> Result<StoredObservations, StoredResultError> {
+        let bad = |why: String| StoredResultError::BadObservations { path: path.to_owned(), why };
+        let text = stored_text(path, bad)?;
+        let past: StoredObservations = serde_json::from_str(&text).map_err(|e| bad(e.to_string()))?;
         if past.schema != SCHEMA {
             return Err(bad(format!("its schema is `{}`, not `{SCHEMA}`", past.schema)));
         }

@@ -3,12 +3,12 @@
 use crate::diagnosis_text::{PASTE, PREDICTED, RANKED, behind};
 use crate::pen::{Pen, TerminalStyle, number};
 use armcal_core::printable;
-use armcal_result::{PastRun, RecordingNames};
+use armcal_result::{RecordingNames, StoredRun};
 use comfy_table::Cell;
 use serde_json::Value;
 
 /// The diagnosis of an earlier run, from its summary: the answer, the ranking, and every number in a sentence.
-pub fn past_diagnosis(past: &PastRun, style: TerminalStyle) -> String {
+pub fn stored_diagnosis(past: &StoredRun, style: TerminalStyle) -> String {
     let pen = Pen { style };
     let d = &past.summary["diagnosis"];
     let names = RecordingNames::new(past.recordings.iter().map(|r| r.name.clone()));

@@ -4,7 +4,7 @@ use crate::error::HeldOutError;
 use armcal_config::{FramePose, Pipeline, TipMount};
 use armcal_core::{Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
-use armcal_result::{PastArms, PastModel};
+use armcal_result::{StoredArms, StoredModel};
 use armcal_stages::Placed;
 use std::ops::Range;
 use std::path::Path;
@@ -19,7 +19,7 @@ use std::path::Path;
 /// # Errors
 /// A nominal arm that differs from the one that was calibrated, or a parameter the result does not have.
 pub fn place(
-    past: &PastModel,
+    past: &StoredModel,
     result: &Path,
     pipeline: &Pipeline,
     surroundings: &Model,
@@ -32,7 +32,7 @@ pub fn place(
 /// # Errors
 /// As [`place`].
 pub fn place_arms(
-    then: &PastArms,
+    then: &StoredArms,
     session: &Session,
     origin: &Path,
     pipeline: &Pipeline,
@@ -81,7 +81,7 @@ pub fn place_arms(
 }
 
 /// A tip that is kept from the calibration although the pipeline declares another.
-fn tip_overruled(then: &PastArms, pipeline: &Pipeline, model: &Model) -> Option<Warning> {
+fn tip_overruled(then: &StoredArms, pipeline: &Pipeline, model: &Model) -> Option<Warning> {
     let declared = pipeline.frames.tip.pose != FramePose::Estimated && pipeline.verify.tip == TipMount::Kept;
     let tip_m = |model: &Model| model.tip_in_last_link(&model.nominal()).translation.vector;
     let apart_m = (tip_m(model) - tip_m(&then.model)).norm();
@@ -120,7 +120,7 @@ pub fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
 }
 
 /// The base of an arm as far as calibration and the new recordings know it together.
-fn base(then: &PastArms, pipeline: &Pipeline, arm: usize, now: &Pose) -> Pose {
+fn base(then: &StoredArms, pipeline: &Pipeline, arm: usize, now: &Pose) -> Pose {
     let measured = then.model.arm_base_in_world(&then.model.nominal(), arm);
     let calibrated = then.model.arm_base_in_world(&then.values, arm);
     let of_arm = pipeline.two_arms.as_ref().and_then(|two| two.arms.get(arm));

@@ -3,11 +3,11 @@
 mod bands;
 mod basis;
 mod groups;
-mod lever;
+mod of_dwells;
 mod signature;
 
 pub use bands::{Band, bands, drivers_of};
 pub use basis::{Basis, Driver};
 pub use groups::{Group, groups};
-pub use lever::{Channel, Levers};
+pub use of_dwells::{Channel, Sensitivities};
 pub use signature::{Signature, signatures};

@@ -1,6 +1,6 @@
 //! Where a residual may come from: what each dwell says about each joint, about all lengths together, about the tip.
 //!
-//! An implied error is linear in the residual, so each dwell has one lever for each channel. They are worked out once, at
+//! An implied error is linear in the residual, so each dwell has one sensitivity for each channel. They are worked out once, at
 //! the run's own fit, and serve every refit: geometry that differs by some millimetres does not move them.
 
 use crate::analysis::moves_tip;
@@ -26,7 +26,7 @@ pub struct Channel {
 
 /// What one dwell says about one channel, by the residual.
 #[derive(Debug, Clone, Copy)]
-struct Lever {
+struct Sensitivity {
     /// Implied error = this . residual [m], in the channel's unit.
     gain: Vector3<f64>,
     /// Displacement of the tip [m] by one unit of the channel.
@@ -35,35 +35,37 @@ struct Lever {
     sigma: f64,
 }
 
-/// The channels of a run, and the lever of each dwell on each.
-pub struct Levers {
+/// The channels of a run, and the sensitivity of each dwell on each.
+pub struct Sensitivities {
     /// Joints first, then `lengths`, then the world's axes.
     pub channels: Vec<Channel>,
     /// `[channel][observation]`.
-    levers: Vec<Vec<Option<Lever>>>,
+    sensitivity: Vec<Vec<Option<Sensitivity>>>,
 }
 
-impl Levers {
+impl Sensitivities {
     /// At the run's fit.
-    pub fn of(run: &Run) -> Levers {
+    pub fn of(run: &Run) -> Sensitivities {
         let channels = channels(run);
         let joints = run.model.joint_count();
-        let mut levers = vec![Vec::with_capacity(run.observations.len()); channels.len()];
+        let mut sensitivity = vec![Vec::with_capacity(run.observations.len()); channels.len()];
         let values = run.calibration.fit.values();
         for o in &run.observations {
-            let row = joint_levers(run, &values, o).into_iter().chain([length_lever(run, &values, o)]);
-            for (lever, all) in row.chain((0..3).map(|axis| Some(along(axis, o)))).zip(&mut levers) {
-                all.push(lever);
+            let row =
+                joint_sensitivities(run, &values, o).into_iter().chain([length_sensitivity(run, &values, o)]);
+            for (sensitivity, all) in row.chain((0..3).map(|axis| Some(along(axis, o)))).zip(&mut sensitivity)
+            {
+                all.push(sensitivity);
             }
         }
-        levers.iter_mut().take(joints + 1).for_each(|all| drop_uncertain(all));
-        Levers { channels, levers }
+        sensitivity.iter_mut().take(joints + 1).for_each(|all| drop_uncertain(all));
+        Sensitivities { channels, sensitivity }
     }
 
     /// What these residuals [m] say about a channel, in its unit.
     pub fn implied(&self, channel: usize, residuals_m: &[Vector3<f64>]) -> Vec<Option<f64>> {
-        let each = self.levers[channel].iter().zip(residuals_m);
-        each.map(|(lever, r)| lever.map(|l| l.gain.dot(r))).collect()
+        let each = self.sensitivity[channel].iter().zip(residuals_m);
+        each.map(|(sensitivity, r)| sensitivity.map(|l| l.gain.dot(r))).collect()
     }
 
     /// Whether each channel is drawn, by what the run's own calibration leaves: all but joints that do not move the tip.
@@ -77,8 +79,8 @@ impl Levers {
     /// Which share of these displacements [m] a channel alone can stand for, squared, 0 to 1.
     pub fn share(&self, channel: usize, displacements_m: &[Vector3<f64>]) -> f64 {
         let (mut left, mut all) = (0.0, 0.0);
-        for (lever, d) in self.levers[channel].iter().zip(displacements_m) {
-            let stands_for = lever.map_or_else(Vector3::zeros, |l| l.column_m * l.gain.dot(d));
+        for (sensitivity, d) in self.sensitivity[channel].iter().zip(displacements_m) {
+            let stands_for = sensitivity.map_or_else(Vector3::zeros, |l| l.column_m * l.gain.dot(d));
             left += (d - stands_for).norm_squared();
             all += d.norm_squared();
         }
@@ -103,20 +105,20 @@ fn channels(run: &Run) -> Vec<Channel> {
 }
 
 /// Degrees (millimetres of a slide) of each joint.
-fn joint_levers(run: &Run, values: &[f64], o: &Observation) -> Vec<Option<Lever>> {
+fn joint_sensitivities(run: &Run, values: &[f64], o: &Observation) -> Vec<Option<Sensitivity>> {
     let unit = |axis: usize| implied_joint_errors(&run.model, values, o, &Vector3::ith(axis, 1.0));
     let (x, y, z) = (unit(0), unit(1), unit(2));
     let columns = run.model.joint_jacobian(values, o);
     let shown: Vec<f64> = joint_units(run).iter().map(|u| u.to_display(1.0)).collect();
     let one = |j: usize| {
         let gain = Vector3::new(x[j]?.error, y[j]?.error, z[j]?.error) * shown[j];
-        Some(Lever { gain, column_m: columns.column(j) / shown[j], sigma: x[j]?.sigma * shown[j] })
+        Some(Sensitivity { gain, column_m: columns.column(j) / shown[j], sigma: x[j]?.sigma * shown[j] })
     };
     (0..x.len()).map(one).collect()
 }
 
 /// Parts per million of all lengths.
-fn length_lever(run: &Run, values: &[f64], o: &Observation) -> Option<Lever> {
+fn length_sensitivity(run: &Run, values: &[f64], o: &Observation) -> Option<Sensitivity> {
     let (model, p) = run.model.in_recording(o.dwell.recording, values);
     // The jacobian is that of measured minus predicted; of a distance it has one row, along it.
     let (residual, jacobian) = model.residual_with_jacobian(&p, o);
@@ -128,23 +130,24 @@ fn length_lever(run: &Run, values: &[f64], o: &Observation) -> Option<Lever> {
     let column_m = run.model.lengths_m().into_iter().map(grown).sum::<Vector3<f64>>() * 1e-6;
     let weighed = PositionNoise::of(&run.model, values, o)?.weigh(&column_m);
     let information = weighed.dot(&column_m);
-    let lever = Lever { gain: weighed / information, column_m, sigma: information.sqrt().recip() };
-    lever.gain.iter().all(|g| g.is_finite()).then_some(lever)
+    let sensitivity =
+        Sensitivity { gain: weighed / information, column_m, sigma: information.sqrt().recip() };
+    sensitivity.gain.iter().all(|g| g.is_finite()).then_some(sensitivity)
 }
 
 /// Millimetres along an axis of the world.
-fn along(axis: usize, o: &Observation) -> Lever {
+fn along(axis: usize, o: &Observation) -> Sensitivity {
     let unit = Vector3::ith(axis, 1.0);
     let sigma = o.covariance_m2[(axis, axis)].sqrt() * 1e3;
-    Lever { gain: unit * 1e3, column_m: unit * 1e-3, sigma }
+    Sensitivity { gain: unit * 1e3, column_m: unit * 1e-3, sigma }
 }
 
-fn drop_uncertain(levers: &mut [Option<Lever>]) {
-    let sigmas: Vec<f64> = levers.iter().flatten().map(|l| l.sigma).collect();
+fn drop_uncertain(sensitivity: &mut [Option<Sensitivity>]) {
+    let sigmas: Vec<f64> = sensitivity.iter().flatten().map(|l| l.sigma).collect();
     let usual = median(&sigmas);
-    for lever in levers {
-        if lever.is_some_and(|l| l.sigma > BLURRED * usual) {
-            *lever = None;
+    for sensitivity in sensitivity {
+        if sensitivity.is_some_and(|l| l.sigma > BLURRED * usual) {
+            *sensitivity = None;
         }
     }
 }

@@ -11,14 +11,14 @@ use armcal_recording::Recording;
 use armcal_result::{Conclusions, Grounds, RecordingRun, Run, Undiagnosed};
 use armcal_setup as setup;
 use armcal_stages::associated::Associated;
-use armcal_stages::{Fitted, Inputs, Rounds, RunError, Seen, Steps, fit_places, frames, perceive};
+use armcal_stages::{Fitted, Inputs, RecordingData, Rounds, RunError, Steps, fit_places, frames, preprocess};
 use armcal_table::Association;
 
 /// Association and fit depend on each other; more rounds than this mean they do not settle.
 const MAX_ROUNDS: usize = 4;
 
 /// Recordings whose dwells have found their places, and the calibration on them.
-pub struct Settled {
+pub struct Converged {
     /// The opened recordings.
     pub recordings: Vec<Recording>,
     /// Texts of the nominal model files: one an arm.
@@ -35,7 +35,7 @@ pub struct Settled {
 
 /// Reads the recordings, associates and calibrates in turn until every dwell stays in its place, and looks for mistakes
 /// in the setup.
-pub fn settle(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Settled, RunError> {
+pub fn settle(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Converged, RunError> {
     settle_again(pipeline, None, progress)
 }
 
@@ -45,15 +45,15 @@ pub fn settle_again(
     pipeline: &Pipeline,
     concluded: Option<Conclusions>,
     progress: &dyn Steps,
-) -> Result<Settled, RunError> {
+) -> Result<Converged, RunError> {
     let (model_texts, chain) = frames::nominal_chain(pipeline)?;
     // What `[diagnosis]` says of the effects of the arm is understood before hours of work.
     Knowledge::of(&pipeline.diagnosis, chain.joint_names())?;
     let board = frames::board(pipeline)?;
-    let recordings = perceive::open_all(pipeline, progress)?;
-    let seen = perceive::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
+    let recordings = preprocess::open_all(pipeline, progress)?;
+    let seen = preprocess::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
     let fingerprints: Vec<_> = seen.iter().map(|s| (s.name.as_str(), s.fingerprint.as_ref())).collect();
-    perceive::refuse_repeated(&fingerprints)?;
+    preprocess::refuse_repeated(&fingerprints)?;
     let inputs = Inputs {
         pipeline: pipeline.clone(),
         chain,
@@ -78,7 +78,7 @@ pub fn settle_again(
         Some(earlier) => earlier.setup.clone(),
         None => setup::examine(&inputs, &fitted),
     };
-    Ok(Settled { recordings, model_texts, inputs, setup, fitted, concluded })
+    Ok(Converged { recordings, model_texts, inputs, setup, fitted, concluded })
 }
 
 /// Tells which round begins.
@@ -100,7 +100,7 @@ fn without_setup(source: RunError, inputs: &Inputs) -> RunError {
     }
 }
 
-impl Settled {
+impl Converged {
     /// Of a session whose setup contradicts its data, every further sentence would be about the mistake.
     ///
     /// # Errors
@@ -131,7 +131,7 @@ impl Settled {
     /// The same with the sizes that refits give: what was concluded earlier has them.
     ///
     /// # Errors
-    /// As [`Settled::diagnose`].
+    /// As [`Converged::diagnose`].
     pub fn diagnose_and_refit(
         &self,
         pipeline: &Pipeline,
@@ -207,7 +207,7 @@ pub(crate) fn run_of(
 /// Joins what was seen, where each dwell turned out to be, and what was rejected.
 fn recording_runs(
     pipeline: &Pipeline,
-    seen: Vec<Seen>,
+    seen: Vec<RecordingData>,
     places: Vec<Option<Association>>,
     rejections: &[Rejection],
 ) -> Vec<RecordingRun> {

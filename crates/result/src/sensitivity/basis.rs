@@ -1,6 +1,6 @@
-//! What all refits of a run share: its dwells, what may drive an error, and the levers.
+//! What all refits of a run share: its dwells, what may drive an error, and the sensitivities.
 
-use super::lever::{Levers, joint_units};
+use super::of_dwells::{Sensitivities, joint_units};
 use crate::analysis::feels_gravity;
 use crate::column::Column;
 use crate::run::Run;
@@ -16,7 +16,7 @@ const SMALLEST_SPREAD: f64 = 1e-6;
 /// Made once; every refit, embedded or live, is drawn with it.
 pub struct Basis {
     /// What each dwell says about each place.
-    pub levers: Levers,
+    pub sensitivity: Sensitivities,
     /// Whether each channel is drawn: a joint that does not move the tip is not.
     pub drawn: Vec<bool>,
     /// What errors may follow.
@@ -51,10 +51,10 @@ impl Basis {
         let observations = &run.observations;
         let sign = |o: &armcal_core::Observation, j: usize| o.arrival.get(j).map_or(0, |a| a.sign() as i8);
         let joints = 0..run.model.joint_count();
-        let levers = Levers::of(run);
+        let sensitivity = Sensitivities::of(run);
         Basis {
-            drawn: levers.drawn(run),
-            levers,
+            drawn: sensitivity.drawn(run),
+            sensitivity,
             drivers: drivers(run),
             arrival: joints.map(|j| observations.iter().map(|o| sign(o, j)).collect()).collect(),
             into_board: observations

@@ -34,7 +34,7 @@ pub fn drivers_of(basis: &Basis, channel: usize) -> Vec<String> {
     if !basis.drawn[channel] {
         return Vec::new();
     }
-    let keys: Vec<String> = match basis.levers.channels[channel].joint {
+    let keys: Vec<String> = match basis.sensitivity.channels[channel].joint {
         Some(j) => vec![format!("q{}", j + 1), format!("tau{}", j + 1), "time".into()],
         None => ["time", "temperature", "load"].map(str::to_owned).to_vec(),
     };
@@ -50,7 +50,7 @@ pub fn bands(basis: &Basis, channel: usize, implied: &[Option<f64>]) -> Vec<Band
 /// The bands over one driver.
 pub fn bands_over(basis: &Basis, channel: usize, key: &str, implied: &[Option<f64>]) -> Vec<Band> {
     let Some(driver) = basis.driver(key) else { return Vec::new() };
-    let joint = basis.levers.channels[channel].joint;
+    let joint = basis.sensitivity.channels[channel].joint;
     let x = &basis.drivers[driver].values.0;
     let directions: Vec<Option<i8>> = match joint {
         Some(_) => [1, -1, 0].map(Some).to_vec(),

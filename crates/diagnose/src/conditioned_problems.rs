@@ -30,7 +30,7 @@ const LAST_ROOMS: [usize; 2] = [2, 8];
 
 /// A problem with some effects in its base, weighed; judgements are kept by entry.
 #[derive(Debug, Clone)]
-pub(crate) struct Room {
+pub(crate) struct ConditionedProblem {
     /// The problem.
     pub problem: Problem,
     /// Weighed.
@@ -47,11 +47,21 @@ pub(crate) struct Room {
     judged: RefCell<BTreeMap<usize, Judged>>,
 }
 
-impl Room {
-    fn new(problem: Problem, weighed: Weighed, config: &DiagnosisConfig) -> Room {
+impl ConditionedProblem {
+    fn new(problem: Problem, weighed: Weighed, config: &DiagnosisConfig) -> ConditionedProblem {
         let scatter = weighed.scatter(&problem, config);
         let (exam, nothing, scores, unlisted, significance, judged) = Default::default();
-        Room { problem, weighed, scatter, exam, nothing, scores, unlisted, significance, judged }
+        ConditionedProblem {
+            problem,
+            weighed,
+            scatter,
+            exam,
+            nothing,
+            scores,
+            unlisted,
+            significance,
+            judged,
+        }
     }
 
     /// What is left out in turn: places, or stretches of time where the noise remembers (neighbours in time would tell).
@@ -65,7 +75,7 @@ impl Room {
 
     /// What explanations cost beside each other [nats].
     pub fn costs<'r>(&'r self, config: &'r DiagnosisConfig) -> Costs<'r> {
-        Costs { room: self, config }
+        Costs { conditioned: self, config }
     }
 
     /// The score of the base alone.
@@ -98,7 +108,7 @@ impl Room {
                 (0..unlisted.len()).filter(|k| unlisted[*k].ln_evidence > 0.0).collect();
             order.sort_by(|a, b| unlisted[*b].ln_evidence.total_cmp(&unlisted[*a].ln_evidence));
             let score = |k: usize| {
-                let columns = self.weighed.tamed(&unlisted[k].what.columns, &self.problem, config);
+                let columns = self.weighed.regularised(&unlisted[k].what.columns, &self.problem, config);
                 (k, self.score_with(&columns))
             };
             let scored = order.into_iter().take(UNLISTED_SCORED).map(score);
@@ -133,8 +143,8 @@ impl Room {
     /// Whether something that is not listed says clearly more than nothing, and than what it costs, of dwells that the fit did not
     /// see; and not by a few folds alone, as accidents let it.
     pub fn predicts(&self, unlisted: &Outside, config: &DiagnosisConfig) -> bool {
-        let (costs, Room { problem, weighed, .. }) = (self.costs(config), self);
-        let effect = weighed.tamed(&unlisted.what.columns, problem, config);
+        let (costs, ConditionedProblem { problem, weighed, .. }) = (self.costs(config), self);
+        let effect = weighed.regularised(&unlisted.what.columns, problem, config);
         let score = self.score_with(&effect).above(self.nothing());
         score.is_clear(costs.of_unlisted() - costs.of_nothing())
             && weighed.gain(problem, &effect, &self.exam().folds, config).p <= config.max_p_adjusted
@@ -142,7 +152,7 @@ impl Room {
 }
 
 /// Gives rooms and remembers them: the same base is asked for more than once.
-pub(crate) struct Rooms<'a> {
+pub(crate) struct ConditionedProblems<'a> {
     refit: &'a mut dyn Refit,
     keep: Vec<bool>,
     /// What problems of these dwells share.
@@ -152,54 +162,58 @@ pub(crate) struct Rooms<'a> {
     dependences: Arc<Dependences>,
     /// Those that may be asked for again. A room of thousands of poses is tens of megabytes: but for the last ones they live
     /// as long as somebody else needs them, and are made again otherwise.
-    known: Vec<(Vec<String>, Weak<Room>)>,
-    last: VecDeque<Rc<Room>>,
+    known: Vec<(Vec<String>, Weak<ConditionedProblem>)>,
+    last: VecDeque<Rc<ConditionedProblem>>,
     /// Scores of refits, by what was in the model and whether the noise was taken to remember.
     scores: BTreeMap<(Vec<String>, bool), Option<Score>>,
     /// Candidates that could not be evaluated, or not be fitted.
     pub dropped: BTreeSet<String>,
 }
 
-impl<'a> Rooms<'a> {
+impl<'a> ConditionedProblems<'a> {
     /// `keep` masks dwells out of every problem; `first` is the problem without effects, weighed.
     pub fn new(
         refit: &'a mut dyn Refit,
         keep: Vec<bool>,
         first: (Problem, Weighed),
         config: &'a DiagnosisConfig,
-    ) -> Rooms<'a> {
-        let room = Rc::new(Room::new(first.0, first.1, config));
-        let dependences = room.weighed.dependences.clone();
+    ) -> ConditionedProblems<'a> {
+        let conditioned = Rc::new(ConditionedProblem::new(first.0, first.1, config));
+        let dependences = conditioned.weighed.dependences.clone();
         let (cut, known, last, scores, dropped) = Default::default();
-        let mut rooms = Rooms { refit, keep, cut, config, dependences, known, last, scores, dropped };
-        rooms.remember(Vec::new(), &room);
-        rooms
+        let mut conditioned_problems =
+            ConditionedProblems { refit, keep, cut, config, dependences, known, last, scores, dropped };
+        conditioned_problems.remember(Vec::new(), &conditioned);
+        conditioned_problems
     }
 
     /// The room with these effects in the base.
-    pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<Room>, DiagnoseError> {
+    pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<ConditionedProblem>, DiagnoseError> {
         let names = names(accepted);
-        if let Some(room) = self.known(&names) {
-            return Ok(room);
+        if let Some(conditioned) = self.known(&names) {
+            return Ok(conditioned);
         }
         let problem = self.bare(accepted)?;
         let weighed = weigh_among(&problem, self.dependences.clone(), self.config);
-        let room = Rc::new(Room::new(problem, weighed, self.config));
-        self.known.retain(|(_, room)| room.strong_count() > 0);
-        self.remember(names, &room);
-        Ok(room)
+        let conditioned = Rc::new(ConditionedProblem::new(problem, weighed, self.config));
+        self.known.retain(|(_, conditioned)| conditioned.strong_count() > 0);
+        self.remember(names, &conditioned);
+        Ok(conditioned)
     }
 
     /// The room with effects of these names, if it still is.
-    fn known(&self, names: &[String]) -> Option<Rc<Room>> {
-        self.known.iter().find(|(accepted, _)| accepted == names).and_then(|(_, room)| room.upgrade())
+    fn known(&self, names: &[String]) -> Option<Rc<ConditionedProblem>> {
+        self.known
+            .iter()
+            .find(|(accepted, _)| accepted == names)
+            .and_then(|(_, conditioned)| conditioned.upgrade())
     }
 
-    fn remember(&mut self, accepted: Vec<String>, room: &Rc<Room>) {
-        self.known.push((accepted, Rc::downgrade(room)));
-        self.last.push_back(room.clone());
+    fn remember(&mut self, accepted: Vec<String>, conditioned: &Rc<ConditionedProblem>) {
+        self.known.push((accepted, Rc::downgrade(conditioned)));
+        self.last.push_back(conditioned.clone());
         let [fewest, most] = LAST_ROOMS;
-        let kept = (LAST_DWELLS / room.problem.dwells.len().max(1)).clamp(fewest, most);
+        let kept = (LAST_DWELLS / conditioned.problem.dwells.len().max(1)).clamp(fewest, most);
         while self.last.len() > kept {
             self.last.pop_front();
         }
@@ -217,14 +231,14 @@ impl<'a> Rooms<'a> {
     }
 
     /// The score of a refit with these effects, in the exam of a room; none where they cannot be fitted.
-    pub fn score(&mut self, accepted: &[Candidate], room: &Room) -> Option<Score> {
-        let key = (names(accepted), room.scatter.remembers());
+    pub fn score(&mut self, accepted: &[Candidate], conditioned: &ConditionedProblem) -> Option<Score> {
+        let key = (names(accepted), conditioned.scatter.remembers());
         if let Some(known) = self.scores.get(&key) {
             return known.clone();
         }
         let score = self.base(accepted).ok().map(|problem| {
-            let left = left_out(&problem, None, &room.exam().folds, problem.sigma());
-            Score::of(&problem, &left, room.exam())
+            let left = left_out(&problem, None, &conditioned.exam().folds, problem.sigma());
+            Score::of(&problem, &left, conditioned.exam())
         });
         if score.is_none() {
             self.dropped.extend(accepted.last().map(|candidate| candidate.spec.clone()));
@@ -235,8 +249,13 @@ impl<'a> Rooms<'a> {
 
     /// What a refit with these effects is to have scored.
     #[cfg(test)]
-    pub fn suppose(&mut self, accepted: &[Candidate], room: &Room, score: Option<Score>) {
-        self.scores.insert((names(accepted), room.scatter.remembers()), score);
+    pub fn suppose(
+        &mut self,
+        accepted: &[Candidate],
+        conditioned: &ConditionedProblem,
+        score: Option<Score>,
+    ) {
+        self.scores.insert((names(accepted), conditioned.scatter.remembers()), score);
     }
 
     /// A problem without the dwells that do not count.
@@ -263,7 +282,7 @@ impl<'a> Rooms<'a> {
         let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
             accepted.iter().cloned().partition(|c| c.family == UNLISTED);
         let problem = match self.known(&names(&named)) {
-            Some(room) => room.problem.clone(),
+            Some(conditioned) => conditioned.problem.clone(),
             None => {
                 let problem = self.refit.problem(&named)?;
                 self.kept(problem)?
@@ -289,8 +308,12 @@ fn names(accepted: &[Candidate]) -> Vec<String> {
 }
 
 /// An unlisted shape as something that can join the base, with the freedom these data give it.
-pub(crate) fn as_candidate(cell: &Unlisted, room: &Room, config: &DiagnosisConfig) -> Candidate {
-    let sized = room.weighed.sized(&cell.columns, &room.problem, config);
+pub(crate) fn as_candidate(
+    cell: &Unlisted,
+    conditioned: &ConditionedProblem,
+    config: &DiagnosisConfig,
+) -> Candidate {
+    let sized = conditioned.weighed.sized(&cell.columns, &conditioned.problem, config);
     Candidate {
         spec: cell.name.clone(),
         family: UNLISTED.to_string(),

@@ -1,14 +1,14 @@
 //! `model.json`, the file of `armcal_model_file`: made of a run, and read back from its results.
 
-use crate::PastRunError;
+use crate::StoredResultError;
 use crate::error::ResultError;
-use crate::past::{attachment, past_text};
 use crate::run::{RecordingRun, Run, VERSION};
+use crate::stored::{attachment, stored_text};
 use armcal_core::{DwellMark, FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{Chain, EffectSpec, EffectTable, Model};
 use armcal_model_file::{
-    ArmText, ChainText, FILE, FrameFacts, LengthFacts, MarkerFacts, PastModel, PlaceFacts, RecordingFacts,
-    SCHEMA, Value,
+    ArmText, ChainText, FILE, FrameFacts, LengthFacts, MarkerFacts, PlaceFacts, RecordingFacts, SCHEMA,
+    StoredModel, Value,
 };
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use std::path::Path;
 const MOST_POSTURES: usize = 400;
 
 /// What a run leaves for later: the arm as it was last. What each recording has for itself is that of the last.
-pub fn model_of(run: &Run) -> Result<PastModel, ResultError> {
+pub fn model_of(run: &Run) -> Result<StoredModel, ResultError> {
     let missing = match &run.diagnosis {
         Some(diagnosis) => diagnosis.suggested(run.model.chain().joint_names())?,
         None => Vec::new(),
@@ -53,7 +53,7 @@ pub fn model_of(run: &Run) -> Result<PastModel, ResultError> {
     };
     let recordings = run.recordings.iter().enumerate();
     let judged = calibration.judged();
-    Ok(PastModel {
+    Ok(StoredModel {
         schema: SCHEMA.into(),
         version: VERSION.into(),
         pipeline: run.pipeline_name.clone(),
@@ -90,20 +90,20 @@ pub fn model_of(run: &Run) -> Result<PastModel, ResultError> {
 ///
 /// # Errors
 /// A file that cannot be read, or holds no model in this format.
-pub fn open_model(path: &Path) -> Result<PastModel, PastRunError> {
+pub fn open_model(path: &Path) -> Result<StoredModel, StoredResultError> {
     let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
     let text = if path.extension().is_some_and(|e| e == "mcap") { attached(&path)? } else { file(&path)? };
-    let bad = |why: String| PastRunError::BadModel { path: path.clone(), why };
-    PastModel::from_json(&text).map_err(|e| bad(e.to_string()))
+    let bad = |why: String| StoredResultError::BadModel { path: path.clone(), why };
+    StoredModel::from_json(&text).map_err(|e| bad(e.to_string()))
 }
 
-fn file(path: &Path) -> Result<String, PastRunError> {
-    past_text(path, |why| PastRunError::NoModel { path: path.to_owned(), why })
+fn file(path: &Path) -> Result<String, StoredResultError> {
+    stored_text(path, |why| StoredResultError::NoModel { path: path.to_owned(), why })
 }
 
-fn attached(path: &Path) -> Result<String, PastRunError> {
+fn attached(path: &Path) -> Result<String, StoredResultError> {
     let why = || format!("it has no attachment armcal/{FILE}");
-    attachment(path, FILE)?.ok_or_else(|| PastRunError::NoModel { path: path.to_owned(), why: why() })
+    attachment(path, FILE)?.ok_or_else(|| StoredResultError::NoModel { path: path.to_owned(), why: why() })
 }
 
 /// The files of the nominal arms; the ends of a URDF chain are what the pipeline says.

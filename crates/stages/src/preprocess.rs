@@ -8,7 +8,7 @@ use crate::frames;
 use crate::points;
 use crate::readings::{self, Readings};
 use crate::rigid;
-use crate::seen::Seen;
+use crate::seen::RecordingData;
 use crate::unaligned::{Reading, what_would_align};
 use armcal_config::{BoardPose, FramePose, Pipeline, RecordingEntry};
 use armcal_core::robust::{median, percentile};
@@ -51,7 +51,7 @@ pub fn dwells_of_all(
     recordings: &[Recording],
     progress: &dyn Steps,
     keep: &mut dyn FnMut(Samples),
-) -> Result<Vec<Seen>, RunError> {
+) -> Result<Vec<RecordingData>, RunError> {
     let speed_model = frames::bare(chain, frames::markers(pipeline))?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
     let mut all = entries
@@ -61,7 +61,7 @@ pub fn dwells_of_all(
             keep(samples);
             Ok(seen)
         })
-        .collect::<Result<Vec<Seen>, RunError>>()?;
+        .collect::<Result<Vec<RecordingData>, RunError>>()?;
     effort::warn_of_gaps(chain.joint_names(), &mut all);
     Ok(all)
 }
@@ -99,7 +99,7 @@ fn dwells_of_one(
     index: usize,
     entry: &RecordingEntry,
     recording: &Recording,
-) -> Result<(Samples, Seen), RunError> {
+) -> Result<(Samples, RecordingData), RunError> {
     let name = &entry.name();
     let in_recording = |source| RunError::Recording { recording: name.to_owned(), source };
     let in_dwell = |source| RunError::Dwell { recording: name.to_owned(), source };
@@ -161,7 +161,7 @@ fn dwells_of_one(
     let fingerprint = Arc::new(Fingerprint::of(&samples));
     let readings = Readings::of(&samples.joints, repeated, &dwells);
     let (load_kg, more_loads) = pipeline.loads_of(entry);
-    let seen = Seen {
+    let seen = RecordingData {
         name: name.clone(),
         load_kg,
         more_loads,

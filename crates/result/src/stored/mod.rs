@@ -1,0 +1,12 @@
+//! Results of an earlier run, read back.
+
+mod model;
+mod observations;
+mod run;
+
+pub use model::{model_of, open_model, visited};
+pub use observations::{
+    BoardFacts, OBSERVATIONS_FILE, ObservedRecording, StartFrame, StoredObservations, observations_json,
+};
+pub use run::{RUN, SUMMARY, StoredDwell, StoredRecording, StoredResidual, StoredResultError, StoredRun};
+pub(crate) use run::{attachment, run_file, stored_text};
