@@ -39,7 +39,7 @@ pub fn verdict(run: &Run, limits: &Limits) -> Option<Check> {
         said: String::new(),
         why: Vec::new(),
     };
-    let said = uncapitalised(&armcal_wording::answer(&run).sentence);
+    let said = uncapitalised(&armcal_wording::answer(run).sentence);
     Some(check.saying(said, || reasons::of_run(run, limits)))
 }
 
