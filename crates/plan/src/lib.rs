@@ -2,6 +2,8 @@
 //!
 //! `Known (model, fit, observations) + Rival explanations -> pool (pool, reach) -> greedy choice (choose, discrimination) -> Proposal`.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod advice;
 mod choose;
 mod discrimination;

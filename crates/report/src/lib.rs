@@ -2,14 +2,11 @@
 //! CI, `parameters.toml` and the calibrated model for the robot, Parquet tables for Python, and a summary
 //! for the terminal.
 //!
-//! `Run -> write_all -> files`. All outputs are views of the one [`Run`]; the same run gives the same bytes,
+//! `Run -> write_all -> files`. All outputs are views of the one [`armcal_result::Run`]; the same run gives the same bytes,
 //! and each file appears whole or not at all.
 //!
-//! Many recordings, each with a run of its own, make a [`Campaign`]; calibrated together from what those runs observed, they are
-//! a [`Run`] too, with [`pool_json`] beside its files.
-//!
-//! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
-//! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
+//! Many recordings, each with a run of its own, make a [`armcal_result::Campaign`]; calibrated together from what those runs
+//! observed, they are a run too, with [`pool_json`] beside its files.
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
@@ -34,7 +31,7 @@ mod viewer_text;
 mod write;
 
 pub use campaign::{campaign_files, campaign_json, campaign_row, campaign_text, write_campaign};
-pub use comparison::{comparison_sentence, comparison_text};
+pub use comparison::comparison_text;
 pub use diagnosis_text::{concluded_text, diagnosis_text};
 pub use error::ReportError;
 pub use page::{PageKind, comparison_html, refit_json, report_html};

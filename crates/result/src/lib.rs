@@ -3,7 +3,9 @@
 //! No output is made here, and but for warnings no sentence: `armcal-wording` tells it, `armcal-report` shows it.
 //!
 //! Wherever an error is called *nominal*, it is the error with nominal robot parameters after fitting only
-//! the frames that nobody could know beforehand (base, tool, a board whose pose is estimated).
+//! the unknown frames (base, tool, a board whose pose is estimated).
+
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod adequate;
 pub mod analysis;

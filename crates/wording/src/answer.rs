@@ -41,13 +41,13 @@ pub fn answer(run: &Run) -> Answer {
 }
 
 /// The mistakes of the setup in one sentence; none where there is none.
-pub fn setup_sentence(setup: &SetupReport) -> Option<String> {
+fn setup_sentence(setup: &SetupReport) -> Option<String> {
     let messages: Vec<&str> = setup.mistakes().map(|f| f.message.as_str()).collect();
     (!messages.is_empty()).then(|| printable(&format!("Setup first: {}.", messages.join("; also, "))))
 }
 
 /// The change of the setup that leaves less of the error than what is named physically, in one sentence.
-pub fn setup_beside(setup: &SetupReport) -> Option<String> {
+fn setup_beside(setup: &SetupReport) -> Option<String> {
     let tried =
         setup.findings.iter().find(|f| f.certainty == Certainty::Possible && f.before_mm.is_some())?;
     Some(printable(&format!("Or the setup: {}.", tried.message)))

@@ -1,5 +1,7 @@
 //! What a run found, told in sentences: terminal, page and viewer say the same because all say this.
 
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
+
 mod answer;
 mod drivers;
 mod explanations;

@@ -5,7 +5,7 @@
 use super::*;
 use crate::LinearRefit;
 use crate::problem::Columns;
-use crate::tests::{arm, conditioned, outside, own, quick, with_conditioned};
+use crate::tests::{arm, conditioned, entry, outside, own, quick, with_conditioned};
 use crate::weigh::weigh;
 use std::sync::Arc;
 
@@ -306,4 +306,27 @@ fn doubtful_steps_are_given_a_few_more() {
     let (steps, _) = stepped(&beside("worn", "backlash:3", 0.8), Vec::new(), &quick());
     assert!(steps.len() > 1 && steps.iter().all(|s| !s.named_at_once), "{:?}", names(&steps));
     assert_eq!(names(&steps), ["backlash:1", "backlash:3"]);
+}
+
+#[test]
+fn what_something_else_explains_clearly_better_does_not_lead() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let config = quick();
+    let alone = conditioned(&p, &config);
+    let leads = |spec: &str| {
+        let at = entry(&alone.weighed, spec);
+        let judged = alone.judge(at, &config);
+        let accepted = Accepted {
+            candidate: own(&p, spec),
+            grade: judged.grade(&config),
+            judged,
+            conditioned: alone.clone(),
+            set: vec![at],
+            instead_of: Vec::new(),
+            ranked: Vec::new(),
+        };
+        accepted.leads(&config)
+    };
+    assert!(leads("backlash:1"));
+    assert!(!leads("scale:2"), "the play is clearly better");
 }
