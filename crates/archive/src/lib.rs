@@ -20,7 +20,7 @@ mod workers;
 
 pub use counter::Counter;
 pub use error::ArchiveError;
-pub use shard::{Receipt, Shard};
+pub use shard::{CompletionMarker, Shard};
 
 use armcal_config::{Manifest, Pipeline};
 use armcal_report::write_campaign;
@@ -57,16 +57,20 @@ pub fn batch(
     Ok((campaign, written, skipped))
 }
 
-/// Works on one share of the manifest, and leaves a receipt for [`reduce`].
-pub fn map(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
+/// Works on one share of the manifest, and leaves a completion marker for [`reduce`].
+pub fn map(
+    request: &Request<'_>,
+    shard: Shard,
+    counter: &dyn Counter,
+) -> Result<CompletionMarker, ArchiveError> {
     let completion_marker = work_on(request, shard, counter)?;
     completion_marker.write(request.out)?;
     Ok(completion_marker)
 }
 
-/// The receipt that [`map`] leaves of a share.
-pub fn receipt_file(shard: Shard, out: &Path) -> PathBuf {
-    Receipt::file(shard, out)
+/// The completion marker that [`map`] leaves of a share.
+pub fn completion_marker_file(shard: Shard, out: &Path) -> PathBuf {
+    CompletionMarker::file(shard, out)
 }
 
 /// Puts the shares of a folder together.
@@ -77,7 +81,11 @@ pub fn reduce(out: &Path) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
     put_together(shard::completion_markers(out)?, out)
 }
 
-fn work_on(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result<Receipt, ArchiveError> {
+fn work_on(
+    request: &Request<'_>,
+    shard: Shard,
+    counter: &dyn Counter,
+) -> Result<CompletionMarker, ArchiveError> {
     let Request { manifest, pipeline, out, .. } = request;
     memory::keep_little();
     let store = Store::open(out)?;
@@ -105,11 +113,11 @@ fn work_on(request: &Request<'_>, shard: Shard, counter: &dyn Counter) -> Result
     let skipped = done.iter().filter(|(_, skipped)| *skipped).count();
     let done = done.into_iter().map(|(done, _)| done).collect();
     let campaign = keys.of_campaign(manifest);
-    Ok(Receipt::new(shard, campaign, &pipeline.name, manifest.entries.len(), done, skipped))
+    Ok(CompletionMarker::new(shard, campaign, &pipeline.name, manifest.entries.len(), done, skipped))
 }
 
 fn put_together(
-    completion_markers: Vec<Receipt>,
+    completion_markers: Vec<CompletionMarker>,
     out: &Path,
 ) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
     let (pipeline, done) = shard::together(completion_markers, out)?;

@@ -1,4 +1,4 @@
-//! Shares of a manifest, and the receipts that say what became of them.
+//! Shares of a manifest, and the completion markers that say what became of them.
 
 use super::store;
 use crate::error::ArchiveError;
@@ -11,8 +11,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Where receipts are, below the campaign's folder.
-const RECEIPTS: &str = "shards";
+/// Where completion markers are, below the campaign's folder.
+const MARKERS: &str = "shards";
 const SCHEMA: &str = "armcal.shard/1";
 
 /// Share `number` of `of`, from 1: every `of`-th recording.
@@ -96,7 +96,7 @@ impl Done {
 
 /// What became of a share.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Receipt {
+pub struct CompletionMarker {
     schema: String,
     version: String,
     shard: Shard,
@@ -112,7 +112,7 @@ pub struct Receipt {
     pub skipped: usize,
 }
 
-impl Receipt {
+impl CompletionMarker {
     pub(super) fn new(
         shard: Shard,
         campaign: String,
@@ -120,9 +120,18 @@ impl Receipt {
         recordings: usize,
         done: Vec<Done>,
         skipped: usize,
-    ) -> Receipt {
+    ) -> CompletionMarker {
         let (schema, version) = (SCHEMA.to_owned(), VERSION.to_owned());
-        Receipt { schema, version, shard, campaign, pipeline: pipeline.to_owned(), recordings, done, skipped }
+        CompletionMarker {
+            schema,
+            version,
+            shard,
+            campaign,
+            pipeline: pipeline.to_owned(),
+            recordings,
+            done,
+            skipped,
+        }
     }
 
     /// Recordings of the share without a result.
@@ -130,21 +139,21 @@ impl Receipt {
         self.done.iter().filter(|d| matches!(d, Done::Failed { .. })).count()
     }
 
-    /// The receipt of a share in a campaign's folder.
+    /// The completion marker of a share in a campaign's folder.
     pub(super) fn file(shard: Shard, out: &Path) -> PathBuf {
-        out.join(RECEIPTS).join(format!("{}-of-{}.json", shard.number, shard.of))
+        out.join(MARKERS).join(format!("{}-of-{}.json", shard.number, shard.of))
     }
 
     pub(super) fn write(&self, out: &Path) -> Result<(), ArchiveError> {
-        make_folder_in(out, RECEIPTS).map_err(ArchiveError::Output)?;
+        make_folder_in(out, MARKERS).map_err(ArchiveError::Output)?;
         let text = serde_json::to_vec_pretty(self).map_err(ArchiveError::Json)?;
-        store::write_one(&Receipt::file(self.shard, out), &text)
+        store::write_one(&CompletionMarker::file(self.shard, out), &text)
     }
 }
 
-/// The receipts in a campaign's folder.
-pub(super) fn completion_markers(out: &Path) -> Result<Vec<Receipt>, ArchiveError> {
-    let folder = out.join(RECEIPTS);
+/// The completion markers in a campaign's folder.
+pub(super) fn completion_markers(out: &Path) -> Result<Vec<CompletionMarker>, ArchiveError> {
+    let folder = out.join(MARKERS);
     let entries = std::fs::read_dir(&folder).map_err(|e| ArchiveError::Campaign {
         path: folder.clone(),
         why: format!("{e}; `armcal map` leaves a receipt of every share there"),
@@ -155,7 +164,7 @@ pub(super) fn completion_markers(out: &Path) -> Result<Vec<Receipt>, ArchiveErro
     let read = |path: &std::path::PathBuf| {
         let bad = |why: String| ArchiveError::Campaign { path: path.clone(), why };
         let text = input::read_to_string(path, input::Kind::Data).map_err(|e| bad(e.to_string()))?;
-        let completion_marker: Receipt =
+        let completion_marker: CompletionMarker =
             serde_json::from_str(&text).map_err(|e| bad(format!("{e}; map it again")))?;
         Ok(completion_marker)
     };
@@ -167,7 +176,7 @@ pub(super) fn completion_markers(out: &Path) -> Result<Vec<Receipt>, ArchiveErro
 /// # Errors
 /// Shares of different campaigns or partitions, missing ones, a recording in two of them or in none.
 pub(super) fn together(
-    completion_markers: Vec<Receipt>,
+    completion_markers: Vec<CompletionMarker>,
     out: &Path,
 ) -> Result<(String, Vec<Done>), ArchiveError> {
     let bad = |why: String| ArchiveError::Campaign { path: out.to_owned(), why };
@@ -178,7 +187,7 @@ pub(super) fn together(
         let (a, b) = (first.shard, other.shard);
         if a.of != b.of {
             return Err(bad(format!(
-                "holds shares of two partitions, {a} and {b}: remove those of one from `{RECEIPTS}`"
+                "holds shares of two partitions, {a} and {b}: remove those of one from `{MARKERS}`"
             )));
         }
         if other.campaign != first.campaign || other.version != first.version {
@@ -187,7 +196,7 @@ pub(super) fn together(
             )));
         }
     }
-    let mut by_shard: BTreeMap<Shard, Receipt> = BTreeMap::new();
+    let mut by_shard: BTreeMap<Shard, CompletionMarker> = BTreeMap::new();
     let (of, recordings, pipeline) = (first.shard.of, first.recordings, first.pipeline);
     for completion_marker in completion_markers {
         if let Some(twice) = by_shard.insert(completion_marker.shard, completion_marker) {

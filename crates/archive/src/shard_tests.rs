@@ -1,21 +1,21 @@
 use super::*;
 
-fn completion_marker(number: usize, of: usize, recordings: usize) -> Receipt {
+fn completion_marker(number: usize, of: usize, recordings: usize) -> CompletionMarker {
     let shard = Shard { number, of };
     let done = (0..recordings).filter(|i| shard.has(*i));
     let done = done.map(|index| Done::Calibrated { index, folder: format!("r{index}") }).collect();
-    Receipt::new(shard, "key".into(), "p", recordings, done, 0)
+    CompletionMarker::new(shard, "key".into(), "p", recordings, done, 0)
 }
 
-fn refused(completion_markers: Vec<Receipt>) -> String {
+fn refused(completion_markers: Vec<CompletionMarker>) -> String {
     together(completion_markers, Path::new("D")).expect_err("no whole").to_string()
 }
 
 #[test]
 fn any_number_of_shares_is_the_same_in_the_end() {
     for of in [1, 3, 17] {
-        // Receipts are read in the order of their file names, which is not that of the shares.
-        let mut completion_markers: Vec<Receipt> =
+        // Completion markers are read in the order of their file names, which is not that of the shares.
+        let mut completion_markers: Vec<CompletionMarker> =
             (1..=of).map(|number| completion_marker(number, of, 10)).collect();
         completion_markers.reverse();
         let (_, done) = together(completion_markers, Path::new("D")).expect("a whole");
@@ -32,7 +32,7 @@ fn what_is_missing_or_doubled_is_named() {
     assert!(twice.contains("2/2 is there twice"), "{twice}");
     let mixed = refused(vec![completion_marker(1, 2, 9), completion_marker(2, 3, 9)]);
     assert!(mixed.contains("1/2 and 2/3"), "{mixed}");
-    let other = Receipt { campaign: "another".into(), ..completion_marker(2, 2, 9) };
+    let other = CompletionMarker { campaign: "another".into(), ..completion_marker(2, 2, 9) };
     assert!(refused(vec![completion_marker(1, 2, 9), other]).contains("1/2 and 2/2 are not of one manifest"));
     let mut short = completion_marker(2, 2, 9);
     short.done.pop();

@@ -37,7 +37,7 @@ pub enum Error {
     /// The simulated rig.
     #[error(transparent)]
     Lab(#[from] armcal_lab::LabError),
-    /// Reading back the result of an earlier run.
+    /// Reading back the result of an earlier run, or one that cannot be used here.
     #[error(transparent)]
     StoredRun(#[from] armcal_result::StoredResultError),
     /// Two results of different recordings.
@@ -48,9 +48,6 @@ pub enum Error {
         after.display()
     )]
     NothingInCommon { before: PathBuf, after: PathBuf, why: String },
-    /// A result of an earlier run that cannot be used here, or a folder without any.
-    #[error("{} {problem}", path.display())]
-    Result { path: PathBuf, problem: String },
     /// A value of an option that cannot be used.
     #[error("{option} {value}: {problem}")]
     BadOption { option: &'static str, value: String, problem: String },
@@ -60,7 +57,7 @@ pub enum Error {
     /// A result that cannot be put to use.
     #[error(transparent)]
     Deploy(#[from] armcal_deploy::DeployError),
-    /// A sealed scenario's pipeline switches the diagnosis off.
+    /// A pipeline that switches the diagnosis off, asked for what it would find.
     #[error("the pipeline asks for no diagnosis; remove `enabled = false` from [diagnosis]")]
     NotDiagnosed,
     /// A model that cannot be judged on other recordings.

@@ -5,7 +5,7 @@ use armcal_core::{Pose, RollPitchYaw};
 use armcal_recording::input;
 use armcal_report::summary_json;
 use armcal_result::summary::SCHEMA;
-use armcal_result::{Run, StoredRun};
+use armcal_result::{Run, SUMMARY, StoredRun};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -66,7 +66,7 @@ impl Calibrated {
         let calibrated: Result<Calibrated, _> = if path.extension().is_some_and(|e| e == "mcap") {
             serde_json::from_value(StoredRun::open(path)?.summary)
         } else {
-            let file = if path.is_dir() { path.join("summary.json") } else { path.to_owned() };
+            let file = if path.is_dir() { path.join(SUMMARY) } else { path.to_owned() };
             let text = input::read_to_string(&file, input::Kind::Data)
                 .map_err(|e| bad(format!("cannot be read: {e}")))?;
             serde_json::from_str(&text)

@@ -24,7 +24,7 @@ use std::sync::Arc;
 const UNLISTED: &str = "unlisted";
 /// Unlisted explanations that are scored, those that the weighing likes best.
 const UNLISTED_SCORED: usize = 3;
-/// Dwells of all rooms together that are kept for whoever asks next; and of how many rooms at least and at most.
+/// Dwells of all conditioned problems together that are kept for whoever asks next; and of how many conditioned problems at least and at most.
 const LAST_DWELLS: usize = 4000;
 const LAST_ROOMS: [usize; 2] = [2, 8];
 
@@ -151,7 +151,7 @@ impl ConditionedProblem {
     }
 }
 
-/// Gives rooms and remembers them: the same base is asked for more than once.
+/// Gives conditioned problems and remembers them: the same base is asked for more than once.
 pub(crate) struct ConditionedProblems<'a> {
     refit: &'a mut dyn Refit,
     keep: Vec<bool>,
@@ -160,7 +160,7 @@ pub(crate) struct ConditionedProblems<'a> {
     config: &'a DiagnosisConfig,
     /// The dwells are the same in all.
     dependences: Arc<Dependences>,
-    /// Those that may be asked for again. A room of thousands of poses is tens of megabytes: but for the last ones they live
+    /// Those that may be asked for again. A conditioned problem of thousands of poses is tens of megabytes: but for the last ones they live
     /// as long as somebody else needs them, and are made again otherwise.
     known: Vec<(Vec<String>, Weak<ConditionedProblem>)>,
     last: VecDeque<Rc<ConditionedProblem>>,
@@ -187,7 +187,7 @@ impl<'a> ConditionedProblems<'a> {
         conditioned_problems
     }
 
-    /// The room with these effects in the base.
+    /// The conditioned problem with these effects in the base.
     pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<ConditionedProblem>, DiagnoseError> {
         let names = names(accepted);
         if let Some(conditioned) = self.known(&names) {
@@ -201,7 +201,7 @@ impl<'a> ConditionedProblems<'a> {
         Ok(conditioned)
     }
 
-    /// The room with effects of these names, if it still is.
+    /// The conditioned problem with effects of these names, if it still is.
     fn known(&self, names: &[String]) -> Option<Rc<ConditionedProblem>> {
         self.known
             .iter()
@@ -219,7 +219,7 @@ impl<'a> ConditionedProblems<'a> {
         }
     }
 
-    /// Whether a refit with a candidate changed what it would do: then all rooms are weighed anew.
+    /// Whether a refit with a candidate changed what it would do: then all conditioned problems are weighed anew.
     pub fn refine(&mut self, accepted: &[Candidate], candidate: &Candidate) -> Result<bool, DiagnoseError> {
         let named: Vec<Candidate> = accepted.iter().filter(|c| c.family != UNLISTED).cloned().collect();
         let changed = self.refit.refine(&named, candidate)?;
@@ -230,7 +230,7 @@ impl<'a> ConditionedProblems<'a> {
         Ok(changed)
     }
 
-    /// The score of a refit with these effects, in the exam of a room; none where they cannot be fitted.
+    /// The score of a refit with these effects, in the exam of a conditioned problem; none where they cannot be fitted.
     pub fn score(&mut self, accepted: &[Candidate], conditioned: &ConditionedProblem) -> Option<Score> {
         let key = (names(accepted), conditioned.scatter.remembers());
         if let Some(known) = self.scores.get(&key) {
@@ -292,7 +292,7 @@ impl<'a> ConditionedProblems<'a> {
     }
 }
 
-/// A problem with unlisted shapes in its base. The dwells are the same in all rooms, so a shape's columns fit as they are.
+/// A problem with unlisted shapes in its base. The dwells are the same in all conditioned problems, so a shape's columns fit as they are.
 fn with_shapes(problem: Problem, shapes: &[Candidate]) -> Problem {
     shapes.iter().fold(problem, |problem, shape| {
         let columns = shape.columns.dense(&problem.dwells, 1.0);

@@ -8,7 +8,7 @@ const IMPOSSIBLE: usize = 2;
 /// What is not listed counts as so many amplitudes.
 const UNLISTED: usize = 4;
 
-/// Costs in a room [nats]: [`DiagnosisConfig::margin_nats`] for each amplitude, and -ln of the prior, which the entries of the
+/// Costs in a conditioned problem [nats]: [`DiagnosisConfig::margin_nats`] for each amplitude, and -ln of the prior, which the entries of the
 /// catalogue, and what is not listed, share evenly, and the values of a shape that was searched share that of their entry.
 #[derive(Clone, Copy)]
 pub(crate) struct Costs<'r> {

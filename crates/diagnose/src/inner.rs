@@ -1,4 +1,4 @@
-//! The inner room as one call: from a problem (and a way to refit it) to the whole diagnosis.
+//! The linear core as one call: from a problem (and a way to refit it) to the whole diagnosis.
 
 use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
@@ -169,7 +169,7 @@ fn assemble(
         not_chosen_again: None,
     };
     diagnosis.name_again();
-    // The dwells are the same in all rooms.
+    // The dwells are the same in all conditioned problems.
     diagnosis.record_next = next::record_next(&rest.problem, &diagnosis);
     diagnosis
 }

@@ -137,7 +137,7 @@ pub(crate) enum Grade {
     Named,
 }
 
-/// The significance of every entry of a room, among all that was tried.
+/// The significance of every entry of a conditioned problem, among all that was tried.
 pub(crate) fn significance(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Vec<Significance> {
     let ConditionedProblem { problem, weighed, .. } = conditioned;
     let directions = gate_directions(problem, weighed);
@@ -147,7 +147,7 @@ pub(crate) fn significance(conditioned: &ConditionedProblem, config: &DiagnosisC
     all
 }
 
-/// Judges an entry of a room, given the significance of all.
+/// Judges an entry of a conditioned problem, given the significance of all.
 pub(crate) fn judge(
     conditioned: &ConditionedProblem,
     significance: &[Significance],
@@ -194,7 +194,7 @@ pub(crate) fn judge(
 }
 
 impl Unlisted {
-    /// The best of a room beside an entry of this score.
+    /// The best of a conditioned problem beside an entry of this score.
     fn beside(
         conditioned: &ConditionedProblem,
         entry: usize,

@@ -1,7 +1,7 @@
 //! Which physical effect is missing from a calibrated model, with error control and honest refusals.
 //!
-//! Two rooms. The inner one ([`diagnose_problem`]) is linear algebra on a [`Problem`]: whitened residuals, what
-//! the geometry could do, and columns of everything that might be missing. The outer one ([`diagnose`]) builds problems from
+//! Two parts. The linear core ([`diagnose_problem`]) is linear algebra on a [`Problem`]: whitened residuals, what
+//! the geometry could do, and columns of everything that might be missing. The model adapter ([`diagnose`]) builds problems from
 //! a model and refits it. In the order of the story:
 //!
 //! * `columns`, `grams`: what might be missing as columns, and what is asked of thousands of them;

@@ -1,4 +1,4 @@
-//! The outer room: a calibrated model and its observations are diagnosed, and what was found is refitted.
+//! The model adapter: a calibrated model and its observations are diagnosed, and what was found is refitted.
 
 use crate::conclude::Evidence;
 use crate::diagnosis::Refitted;

@@ -35,7 +35,7 @@ pub(crate) struct Ranking {
 }
 
 impl Ranking {
-    /// Of a search that began in `room`, the one without effects.
+    /// Of a search that began in `conditioned`, the one without effects.
     pub fn of(
         search: &Search,
         conditioned: &ConditionedProblem,

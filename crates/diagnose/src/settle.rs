@@ -29,7 +29,7 @@ const ROUNDS: usize = 3;
 /// What stands in the place of a name, beside the other names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Instead {
-    /// An entry of the room.
+    /// An entry of the conditioned problem.
     Entry(usize),
     /// Nothing.
     Nothing,

@@ -65,7 +65,7 @@ pub(crate) fn quick() -> DiagnosisConfig {
 
 pub(crate) use arm::planted;
 
-/// Calls `ask` with the rooms of a problem.
+/// Calls `ask` with the conditioned problems of a problem.
 pub(crate) fn with_conditioned<T>(
     p: &Problem,
     config: &DiagnosisConfig,

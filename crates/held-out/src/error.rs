@@ -1,7 +1,6 @@
 //! Why a model cannot be judged on other recordings.
 
 use armcal_stages::RunError;
-use std::path::PathBuf;
 
 /// Why nothing was judged.
 #[derive(Debug, thiserror::Error)]
@@ -10,12 +9,9 @@ pub enum HeldOutError {
     /// The recordings, or a fit to them.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// Reading back the result.
+    /// Reading back the result, or one that cannot be used here.
     #[error(transparent)]
     StoredRun(#[from] armcal_result::StoredResultError),
-    /// A result that cannot be used here.
-    #[error("{} {problem}", path.display())]
-    Result { path: PathBuf, problem: String },
     /// Judging by ISO 9283.
     #[error("judging by ISO 9283: {0}")]
     Iso(#[from] armcal_iso9283::IsoError),

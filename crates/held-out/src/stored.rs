@@ -4,7 +4,7 @@ use crate::error::HeldOutError;
 use armcal_config::{FramePose, Pipeline, TipMount};
 use armcal_core::{Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
-use armcal_result::{StoredArms, StoredModel};
+use armcal_result::{StoredArms, StoredModel, StoredResultError};
 use armcal_stages::Placed;
 use std::ops::Range;
 use std::path::Path;
@@ -53,7 +53,8 @@ pub fn place_arms(
             continue;
         }
         let Parameter { name, nominal: now, .. } = parameter;
-        let other = |problem| HeldOutError::Result { path: origin.to_owned(), problem };
+        let other =
+            |problem| HeldOutError::from(StoredResultError::Unusable { path: origin.to_owned(), problem });
         let known = then.model.index(name).ok_or_else(|| {
             other(format!(
                 "has no parameter {name}: its arm is not the one of this pipeline; name the [model] it was calibrated with"

@@ -1,7 +1,6 @@
 //! `summary.json`: [`Summary`], told.
 
 use crate::ReportError;
-use armcal_core::Warning;
 use armcal_diagnose::{BeforeAfter, CandidateReport, Diagnosis, ParameterReport, UnknownReport};
 use armcal_result::by_marker::by_marker;
 use armcal_result::summary::{
@@ -16,11 +15,11 @@ use armcal_wording::{answer, conclusion, explanations, pasted};
 /// # Errors
 /// A recording that cannot be read once more for its hash.
 pub fn summary_json(run: &Run) -> Result<String, ReportError> {
-    let text = serde_json::to_string_pretty(&summary(run, run.overall_warnings())?);
+    let text = serde_json::to_string_pretty(&summary(run)?);
     Ok(text.map_err(ReportError::Page)? + "\n")
 }
 
-fn summary(run: &Run, warnings: Vec<Warning>) -> Result<Summary<'_>, ResultError> {
+fn summary(run: &Run) -> Result<Summary<'_>, ResultError> {
     let answer = answer(run);
     let recordings = run.recordings.iter().map(|r| RecordingSummary::of(run, r));
     Ok(Summary {
@@ -40,7 +39,7 @@ fn summary(run: &Run, warnings: Vec<Warning>) -> Result<Summary<'_>, ResultError
         answer_sentence: answer.sentence,
         diagnosis: run.diagnosis.as_ref().map(diagnosis),
         conclusion: conclusion(&run.calibration),
-        warnings,
+        warnings: run.overall_warnings(),
     })
 }
 

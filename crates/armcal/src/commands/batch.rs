@@ -3,7 +3,7 @@
 use super::{Outcome, may_write, print, style};
 use crate::error::Error;
 use crate::progress::Progress;
-use armcal_archive::{Counter as _, Request, Shard, batch, receipt_file};
+use armcal_archive::{Counter as _, Request, Shard, batch, completion_marker_file};
 use armcal_config::{Manifest, Pipeline};
 use armcal_recording::input;
 use armcal_report::{campaign_files, campaign_json, campaign_text};
@@ -56,11 +56,12 @@ pub(crate) fn map(job: &Job<'_>, shard: Option<&str>) -> Result<Outcome, Error> 
     let shard = shard_of(shard)?;
     let pipeline = job.pipeline()?;
     job.note_inputs();
-    may_write([receipt_file(shard, job.out)])?;
+    may_write([completion_marker_file(shard, job.out)])?;
     let progress = Progress::new();
-    let receipt = armcal_archive::map(&job.request(&pipeline), shard, &progress)?;
+    let completion_marker = armcal_archive::map(&job.request(&pipeline), shard, &progress)?;
     progress.finish();
-    let (all, failed, skipped) = (receipt.done.len(), receipt.failed(), receipt.skipped);
+    let (all, failed, skipped) =
+        (completion_marker.done.len(), completion_marker.failed(), completion_marker.skipped);
     print(&format!("share {shard}: {all} recordings, {failed} failed, {skipped} were there already\n"))?;
     Ok(if failed > 0 { Outcome::CompletedWithWarnings } else { Outcome::Done })
 }

@@ -6,6 +6,7 @@ use crate::progress::Progress;
 use crate::view::{Given, RefitSession, serve};
 use armcal_recording::input::{Kind, read_to_string};
 use armcal_report::summary_json;
+use armcal_result::SUMMARY;
 use std::path::Path;
 
 /// Runs the pipeline behind `input` and serves its report until the user stops it.
@@ -13,10 +14,10 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
     let given = Given::by(input)?;
     let path = given.pipeline.clone();
     let progress = Progress::new();
-    let bench = RefitSession::of(given, &progress)?;
+    let session = RefitSession::of(given, &progress)?;
     progress.finish();
-    let written = read_to_string(&input.join("summary.json"), Kind::Data);
-    let now = summary_json(bench.run())?;
+    let written = read_to_string(&input.join(SUMMARY), Kind::Data);
+    let now = summary_json(session.run())?;
     if written.is_ok_and(|text| text != now) {
         print(&format!(
             "{} holds other results than its pipeline and recordings give now; the page shows what they give now.\n",
@@ -24,6 +25,8 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
         ))?;
     }
     crate::stdout::tell(&armcal_recording::losses());
-    serve(bench, port, |address| print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display())))?;
+    serve(session, port, |address| {
+        print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display()))
+    })?;
     Ok(Outcome::Done)
 }

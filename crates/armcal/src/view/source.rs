@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use armcal_recording::{atomic, input};
-use armcal_result::Conclusions;
+use armcal_result::{Conclusions, RUN, StoredResultError};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -58,7 +58,7 @@ impl Given {
         }
         let problem =
             "it pools other results, and this is asked of a pipeline with recordings; name one".to_owned();
-        Err(Error::Result { path: input.to_owned(), problem })
+        Err(StoredResultError::Unusable { path: input.to_owned(), problem }.into())
     }
 }
 
@@ -67,7 +67,7 @@ fn folder_of(input: &Path) -> Option<&Path> {
     match input.is_dir() {
         // Where a pipeline is meant it is refused as a folder.
         true => Some(input).filter(|_| input.extension().is_none_or(|e| e != "toml")),
-        false => input.parent().filter(|_| input.file_name().is_some_and(|name| name == "run.mcap")),
+        false => input.parent().filter(|_| input.file_name().is_some_and(|name| name == RUN)),
     }
 }
 
@@ -75,7 +75,7 @@ fn folder_of(input: &Path) -> Option<&Path> {
 fn source_of(input: &Path) -> Result<(PathBuf, Vec<PathBuf>), Error> {
     let Some(folder) = folder_of(input) else { return Ok((input.to_owned(), Vec::new())) };
     let path = folder.join(FILE);
-    let unknown = |why: String| Error::Result {
+    let unknown = |why: String| StoredResultError::Unusable {
         path: input.to_owned(),
         problem: format!(
             "does not say which pipeline made it (view.toml: {why}); name the pipeline file instead"

@@ -81,7 +81,7 @@ fn a_candidate_is_found_by_name_and_else_by_family_and_target() {
     assert_eq!(entry_of(&weighed, &Candidate { family: "else".into(), ..other }), None);
 }
 
-/// A room in which only what is given was weighed; `predicts` are the columns of the planted effect.
+/// A conditioned problem in which only what is given was weighed; `predicts` are the columns of the planted effect.
 pub(crate) fn told(entry: (&str, f64), unlisted: &[(&str, bool, f64)]) -> ConditionedProblem {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let config = quick();

@@ -10,7 +10,7 @@ use crate::tests::{arm, conditioned, entry, own, planted, quick, scatter, with_c
 use armcal_core::DwellId;
 use std::sync::Arc;
 
-/// The entry of a problem's first room as it would be accepted.
+/// The entry of a problem's first conditioned problem as it would be accepted.
 fn accepted(p: &Problem, spec: &str) -> Accepted {
     let config = quick();
     let conditioned = conditioned(p, &config);

@@ -11,7 +11,7 @@ use armcal_core::DwellId;
 use nalgebra::DMatrix;
 use std::rc::Rc;
 
-/// A planted play in a room of its own.
+/// A planted play in a conditioned problem of its own.
 fn play() -> (Problem, ConditionedProblem) {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let conditioned = Rc::try_unwrap(conditioned(&p, &quick())).expect("nobody else has the room");

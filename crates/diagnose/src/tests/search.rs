@@ -57,7 +57,7 @@ fn a_search_tells_names_curves_and_what_is_left() {
 fn names_of_fewer_dwells_are_a_beginning_and_nothing_more() {
     let config = quick();
     let p = planted(&[("backlash:1", 1.0), ("eccentricity:2", 1.0)], 60, 3);
-    // How many rooms were made, and what was found.
+    // How many conditioned problems were made, and what was found.
     let searched = |proposed: &[&str]| {
         let proposed: Vec<Candidate> = proposed.iter().map(|spec| own(&p, spec)).collect();
         let mut refit = Counted { inner: LinearRefit::new(p.clone()), asked: 0 };

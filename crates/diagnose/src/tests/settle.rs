@@ -114,7 +114,7 @@ fn halved() -> Problem {
     with_twin(|a, _| DMatrix::from_columns(&[half * a.column(0), half * a.column(0)]))
 }
 
-/// What was found, by another name of its room.
+/// What was found, by another name of its conditioned problem.
 fn renamed(found: &Accepted, name: &str) -> Accepted {
     let conditioned = found.conditioned.clone();
     let entry = crate::tests::entry(&conditioned.weighed, name);

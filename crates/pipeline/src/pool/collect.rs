@@ -7,7 +7,7 @@ use armcal_core::{Against, Dwell, Observation, Pose, Severity, Stage, Warning};
 use armcal_recording::RecordingReport;
 use armcal_result::{
     BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, RecordingRun, StartFrame,
-    StoredObservations, also_in, sha256,
+    StoredObservations, StoredResultError, also_in, sha256,
 };
 use armcal_stages::RunError;
 use armcal_table::{Assignment, Association, Board, Place};
@@ -57,7 +57,8 @@ pub(super) fn collect(
     for result in results(folders)? {
         let past = StoredObservations::open(&result)?;
         if let Some(problem) = contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
-            return Err(PoolError::Result { path: result, problem: format!("cannot be pooled: {problem}") });
+            let problem = format!("cannot be pooled: {problem}");
+            return Err(StoredResultError::Unusable { path: result, problem }.into());
         }
         let recordings = past.recordings.into_iter();
         found.extend(recordings.map(|recording| Found { result: result.clone(), recording }));
@@ -178,7 +179,9 @@ fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, PoolError> {
         if here.is_empty() {
             let problem = "holds no observations.json, in none of its folders: name the results of `armcal run`, and run older ones \
                            again";
-            return Err(PoolError::Result { path: folder.clone(), problem: problem.to_owned() });
+            return Err(
+                StoredResultError::Unusable { path: folder.clone(), problem: problem.to_owned() }.into()
+            );
         }
         all.extend(here);
     }

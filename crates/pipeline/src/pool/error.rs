@@ -1,21 +1,16 @@
 //! What stops a pool.
 
 use armcal_stages::RunError;
-use std::path::PathBuf;
 
 /// Why results cannot be pooled.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each message says what its fields are")]
 pub enum PoolError {
     /// The pipeline, or the fit of all of them.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// Reading back a result.
+    /// Reading back a result, one that cannot be pooled, or a folder without any.
     #[error(transparent)]
     StoredRun(#[from] armcal_result::StoredResultError),
-    /// A result that cannot be used here, or a folder without any.
-    #[error("{} {problem}", path.display())]
-    Result { path: PathBuf, problem: String },
 }
 
 armcal_stages::stopped_as_run!(

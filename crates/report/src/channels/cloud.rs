@@ -3,6 +3,7 @@
 use super::arrows::Drawing;
 use super::shapes::at;
 use super::{Messages, WORLD, start_ns, timestamp};
+use armcal_result::proto::count;
 use armcal_result::{Point, RecordingRun};
 use foxglove::messages as fox;
 use foxglove::messages::packed_element_field::NumericType;
@@ -32,7 +33,7 @@ pub(super) fn put(recording: &RecordingRun, own: &[&Point], drawing: &Drawing, o
         offset: k * BYTES,
         r#type: NumericType::Float32 as i32,
     };
-    let numbers = armcal_result::proto::count(FIELDS.len()) * BYTES;
+    let numbers = count(FIELDS.len()) * BYTES;
     let part = |(k, name): (u32, &&str)| fox::PackedElementField {
         name: (*name).to_owned(),
         offset: numbers + k,
@@ -42,7 +43,7 @@ pub(super) fn put(recording: &RecordingRun, own: &[&Point], drawing: &Drawing, o
         timestamp: Some(timestamp(start_ns)),
         frame_id: WORLD.into(),
         pose: Some(at(&Vector3::zeros())),
-        point_stride: numbers + armcal_result::proto::count(COLOUR.len()),
+        point_stride: numbers + count(COLOUR.len()),
         fields: (0..).zip(&FIELDS).map(field).chain((0..).zip(&COLOUR).map(part)).collect(),
         data: data.into(),
     };

@@ -5,6 +5,7 @@ use super::{Messages, run_start_ns, start_ns};
 use crate::findings::Findings;
 use crate::viewer_text::for_viewer;
 use armcal_result::Run;
+use armcal_result::proto;
 use armcal_wording::{Story, ToldWarning};
 
 pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
@@ -13,44 +14,32 @@ pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
     out.put("/armcal/story", begin_ns, &story(&Story::of(run), begin_ns));
     for joint in &f.joints {
         let topic = implied_topic(joint.number);
-        out.put(topic, begin_ns, &armcal_result::proto::JointErrors { timestamp: stamp(), ..joint.clone() });
+        out.put(topic, begin_ns, &proto::JointErrors { timestamp: stamp(), ..joint.clone() });
     }
     for board in &f.boards {
         let start_ns = start_ns(&run.recordings[board.recording_index as usize]);
-        let message = armcal_result::proto::BoardErrors { timestamp: time(start_ns), ..board.clone() };
+        let message = proto::BoardErrors { timestamp: time(start_ns), ..board.clone() };
         out.put(board_topic(board.recording_index), start_ns, &message);
     }
-    out.put(
-        "/armcal/course",
-        begin_ns,
-        &armcal_result::proto::Course { timestamp: stamp(), ..f.course.clone() },
-    );
-    out.put(
-        "/armcal/steps",
-        begin_ns,
-        &armcal_result::proto::Steps { timestamp: stamp(), ..f.steps.clone() },
-    );
+    out.put("/armcal/course", begin_ns, &proto::Course { timestamp: stamp(), ..f.course.clone() });
+    out.put("/armcal/steps", begin_ns, &proto::Steps { timestamp: stamp(), ..f.steps.clone() });
     if let Some((diagnosis, candidates)) = &f.diagnosis {
-        let diagnosis = armcal_result::proto::Diagnosis { timestamp: stamp(), ..diagnosis.clone() };
+        let diagnosis = proto::Diagnosis { timestamp: stamp(), ..diagnosis.clone() };
         out.put("/armcal/diagnosis", begin_ns, &diagnosis);
-        let candidates = armcal_result::proto::Candidates { timestamp: stamp(), ..candidates.clone() };
+        let candidates = proto::Candidates { timestamp: stamp(), ..candidates.clone() };
         out.put("/armcal/candidates", begin_ns, &candidates);
-        let effects = armcal_result::proto::EffectTable { timestamp: stamp(), ..f.effects.clone() };
+        let effects = proto::EffectTable { timestamp: stamp(), ..f.effects.clone() };
         out.put("/armcal/effect_table", begin_ns, &effects);
     }
     for (number, curve) in (1..).zip(&f.curves) {
-        let message = armcal_result::proto::ErrorCurve { timestamp: stamp(), ..curve.clone() };
+        let message = proto::ErrorCurve { timestamp: stamp(), ..curve.clone() };
         out.put(curve_topic(number), begin_ns, &message);
     }
-    out.put(
-        "/armcal/quality",
-        begin_ns,
-        &armcal_result::proto::Quality { timestamp: stamp(), ..f.quality.clone() },
-    );
+    out.put("/armcal/quality", begin_ns, &proto::Quality { timestamp: stamp(), ..f.quality.clone() });
 }
 
-pub(super) fn story(s: &Story, time_ns: i64) -> armcal_result::proto::Story {
-    armcal_result::proto::Story {
+pub(super) fn story(s: &Story, time_ns: i64) -> proto::Story {
+    proto::Story {
         timestamp: time(time_ns),
         lamp: s.lamp.into(),
         lines: for_viewer(s.lines()),

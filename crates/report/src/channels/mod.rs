@@ -59,6 +59,7 @@ use crate::findings::Findings;
 use armcal_core::Dwell;
 use armcal_dwell::ClockAlignment;
 use armcal_recording::RecordingReport;
+use armcal_result::proto::count;
 use armcal_result::{Point, RecordingRun, Run};
 use foxglove::messages::Timestamp;
 use foxglove::{Encode, Schema};
@@ -166,7 +167,7 @@ impl Messages {
 
     /// Text as ROS 2 has it: a string in little-endian CDR (OMG DDS-XTypes 1.3, 7.4) behind its four bytes of header.
     fn put_text(&mut self, topic: &str, time_ns: i64, text: &str) {
-        let length = armcal_result::proto::count(text.len() + 1).to_le_bytes();
+        let length = count(text.len() + 1).to_le_bytes();
         let data = [&[0, 1, 0, 0], &length[..], text.as_bytes(), &[0]].concat();
         self.messages.push(ResultMessage {
             topic: topic.into(),

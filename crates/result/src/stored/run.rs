@@ -90,6 +90,9 @@ pub enum StoredResultError {
         path.display()
     )]
     NoResults { path: PathBuf, topic: &'static str },
+    /// A result that cannot be used where it was named, or a folder without any.
+    #[error("{} {problem}", path.display())]
+    Unusable { path: PathBuf, problem: String },
     /// A file of the result is there and cannot be read.
     #[error("reading {}: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
