@@ -33,8 +33,8 @@ pub struct DiagnosisConfig {
     pub merge_cosine: f64,
     /// Largest p-value of the leave-place-out gain (sign flips); default 0.05.
     pub max_p_heldout: f64,
-    /// A further effect must remove at least this share of what the first one removed, and this share of what an effect gains
-    /// may be the detail of its shape; default 0.01.
+    /// A further effect must remove at least this share of what each one before it removed whose shape it could be, and this
+    /// share of what an effect gains may be the detail of its shape; default 0.01.
     pub leftover_share: f64,
     /// Pairs with an expected log-likelihood ratio (times two) below this cannot be told apart; default 6.
     pub min_delta: f64,

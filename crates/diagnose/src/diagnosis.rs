@@ -85,7 +85,7 @@ pub struct Diagnosis {
     pub p_nothing: f64,
     /// Unlisted shapes that were weighed.
     pub tried_unlisted: usize,
-    /// Whether what is left over is so small a part of the first effect that it may be that effect's shape.
+    /// Whether what is left over is so small a part of an effect that was found that it may be that effect's shape.
     pub rest_may_be_shape: bool,
     /// Mean position error before and after what was found [mm]: of the calibrations with and without it, on the
     /// points by which they are judged (see `judged`).

@@ -15,6 +15,9 @@ use std::rc::Rc;
 
 /// Steps none of which had a name at once, and which together say less than one unlisted shape: no more are tried.
 const PATIENCE: usize = 4;
+/// Share of the nats of an earlier effect that a detail of its shape may gain: a hundredth of the squared error where the effect is ten
+/// times what remains, ln(1 + 1) / ln(1 + 100).
+const DETAIL_NATS: f64 = 0.15;
 
 /// Entries that are scored at each step, those that the weighing likes best.
 const LEADING: usize = 8;
@@ -72,7 +75,15 @@ pub(crate) struct Step {
 impl Step {
     /// One that was confirmed before.
     pub fn known(candidate: Candidate, fall: f64) -> Step {
-        Step { candidate, named_at_once: true, gain_nats: 0.0, unlisted_nats: 0.0, fall }
+        Step { candidate, named_at_once: true, gain_nats: f64::INFINITY, unlisted_nats: 0.0, fall }
+    }
+
+    /// Whether it may be no more than what the formula of an earlier one leaves of its shape: it could look like that, removes a
+    /// small share of the squared error that the earlier one removed, and adds a small share of what that one said.
+    fn may_be_detail_of(&self, earlier: &Step, config: &DiagnosisConfig) -> bool {
+        self.fall < config.leftover_share * earlier.fall
+            && self.gain_nats < DETAIL_NATS * earlier.gain_nats
+            && switches_alike(&earlier.candidate, &self.candidate)
     }
 }
 
@@ -100,14 +111,14 @@ pub(crate) fn confirm(
     steps.retain(|s| at.next().is_some_and(|k| k < together) || s.named_at_once);
     loop {
         let mut judged = Vec::new();
-        let mut weakest: Option<(f64, usize)> = None;
+        let mut gone = None;
         let all: Vec<Candidate> = steps.iter().map(|s| s.candidate.clone()).collect();
         for (k, own) in all.iter().enumerate() {
             let others = [all_but(&all, k), cells.to_vec()].concat();
             let conditioned = conditioned_problems.with(&others)?;
             let weighed = &conditioned.weighed;
             let Some(entry) = entry_of(weighed, own) else {
-                weakest = Some((f64::NEG_INFINITY, k));
+                gone = Some(k);
                 break;
             };
             let mut verdict = conditioned.judge(entry, config);
@@ -117,16 +128,12 @@ pub(crate) fn confirm(
             {
                 verdict.refitted(score, conditioned.nothing());
             }
-            let (grade, nats) = (verdict.grade(config), verdict.gain.nats);
-            if grade == Grade::Refused && weakest.is_none_or(|w| nats < w.0) {
-                weakest = Some((nats, k));
-            }
             let candidate = weighed.entries[entry].candidate.clone();
             judged.push(Accepted {
                 candidate,
+                grade: verdict.grade(config),
                 judged: verdict,
                 conditioned: conditioned.clone(),
-                grade,
                 set: vec![entry],
                 instead_of: Vec::new(),
                 ranked: Vec::new(),
@@ -135,11 +142,18 @@ pub(crate) fn confirm(
         // What is no more than the detail of another one's shape is no effect.
         let most = judged.iter().map(|a| a.judged.gain.nats).fold(0.0, f64::max);
         let detail = judged.iter().position(|a| a.judged.gain.nats < config.leftover_share * most);
-        match weakest.map(|(_, k)| k).or(detail) {
+        match gone.or_else(|| weakest(&judged)).or(detail) {
             Some(k) => drop(steps.remove(k)),
             None => return Ok(judged),
         }
     }
+}
+
+/// Of what is refused, that which says least.
+fn weakest(judged: &[Accepted]) -> Option<usize> {
+    let refused = judged.iter().enumerate().filter(|(_, a)| a.grade == Grade::Refused);
+    let least = refused.min_by(|a, b| a.1.judged.gain.nats.total_cmp(&b.1.judged.gain.nats));
+    least.map(|(k, _)| k)
 }
 
 /// The entry of a candidate; a scan may have moved to another shape, or an event to a dwell nearby.
@@ -219,17 +233,14 @@ pub(crate) fn forward(
             break;
         }
         let fall = judged.own().score * weighed.scale.powi(2);
-        if let Some(first) = steps.first()
-            && fall < config.leftover_share * first.fall
-            && switches_alike(&first.candidate, &entry.candidate)
-        {
-            may_be_shape = true;
-            break;
-        }
         let gain_nats = judged.gain.nats;
         let unlisted_nats = judged.unlisted.as_ref().map_or(0.0, |u| gain_nats + u.above.nats);
         let candidate = entry.candidate.clone();
         let step = Step { candidate, named_at_once: named, gain_nats, unlisted_nats, fall };
+        if steps.iter().any(|earlier| step.may_be_detail_of(earlier, config)) {
+            may_be_shape = true;
+            break;
+        }
         steps.extend(one_by_one(step, &conditioned.problem));
         if cells.is_empty() {
             drop_superseded(&mut steps, conditioned_problems, &conditioned, config);
@@ -239,12 +250,17 @@ pub(crate) fn forward(
         if !been_at.insert(names) {
             break;
         }
-        let nameless = steps.iter().rev().take_while(|s| !s.named_at_once).count();
-        if nameless >= PATIENCE && !beats_a_cell(&steps, config) {
+        if patience_ends(&steps, config) {
             break;
         }
     }
     Ok((steps, may_be_shape))
+}
+
+/// Whether the last steps had no name at once, and all together say no more than an unlisted shape.
+fn patience_ends(steps: &[Step], config: &DiagnosisConfig) -> bool {
+    let nameless = steps.iter().rev().take_while(|s| !s.named_at_once).count();
+    nameless >= PATIENCE && !beats_a_cell(steps, config)
 }
 
 /// Whether what one effect leaves behind could look like the other: an effect that turns over with the direction, or

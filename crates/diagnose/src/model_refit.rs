@@ -96,8 +96,7 @@ impl<'a> ModelRefit<'a> {
             return Ok(fit.clone());
         }
         let model = self.model_with(names)?;
-        let mut values = self.values.clone();
-        values.extend(&model.nominal()[values.len()..]);
+        let mut values = self.of_fewer(names, &model);
         let mut ended = None;
         if !names.is_empty() {
             let fitted = |some: &[&Observation], start: &[f64], sigma_scale: Option<f64>| {
@@ -119,6 +118,20 @@ impl<'a> ModelRefit<'a> {
         let fitted = Rc::new(Fitted { model, values, ended });
         self.fits.insert(names.to_vec(), fitted.clone());
         Ok(fitted)
+    }
+
+    /// Where the largest fit with some of these effects ended, what it does not have as it is nominally: far from there a fit may
+    /// end in another minimum.
+    fn of_fewer(&self, names: &[String], model: &Model) -> Vec<f64> {
+        let mut values = self.values.clone();
+        values.extend(&model.nominal()[values.len()..]);
+        let is_part = |(of, _): &(&Vec<String>, &Rc<Fitted>)| of.iter().all(|name| names.contains(name));
+        if let Some((_, fewer)) = self.fits.iter().filter(is_part).max_by_key(|(of, _)| of.len()) {
+            for (parameter, value) in fewer.model.parameters().iter().zip(&fewer.values) {
+                model.index(&parameter.name).into_iter().for_each(|k| values[k] = *value);
+            }
+        }
+        values
     }
 
     /// Where a fit with these effects nearly ends, from the smallest one with more, and the scale of the residuals there.

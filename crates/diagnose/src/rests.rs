@@ -59,16 +59,18 @@ impl Diagnosis {
     fn loose(&self, calibrated: &Calibrated<'_>, found: &Refitted) -> Option<(EffectSpec, usize)> {
         let values = found.calibration.fit.values();
         let gaps = found.model.gaps(&values).into_iter();
-        // A link that leads in the hand of a servo is no link in a gap.
-        let mut gaps = gaps
-            .filter(|(spec, _, width)| *width > 0.0 || spec.shape.is_empty())
-            .filter(|(spec, ..)| found.effects.contains(spec))
-            .filter(|(spec, ..)| spec.shape.iter().all(|(name, _)| name != REST))
-            .peekable();
+        let mut gaps =
+            gaps.filter(|(spec, _, width)| may_rest(spec, *width) && found.effects.contains(spec)).peekable();
         gaps.peek()?;
         let (joint, p) = most_of(calibrated, found, &values)?;
         gaps.find(|(_, at, _)| *at == joint && p < IMPROBABLE).map(|(spec, joint, _)| (spec, joint))
     }
+}
+
+/// Whether a joint may rest in a gap: no part of it has been told yet, and it is one. A link that leads in the hand of a servo is
+/// no link in a gap.
+fn may_rest(spec: &EffectSpec, width: f64) -> bool {
+    (width > 0.0 || spec.shape.is_empty()) && spec.shape.iter().all(|(name, _)| name != REST)
 }
 
 /// The joint along which errors are largest against those across it, and how improbable that is of errors alike in every direction
@@ -146,3 +148,7 @@ fn own_variance(calibrated: &Calibrated<'_>, refitted: &Refitted, values: &[f64]
     }
     sum / weights
 }
+
+#[cfg(test)]
+#[path = "tests/rests.rs"]
+mod tests;

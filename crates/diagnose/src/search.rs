@@ -24,7 +24,7 @@ pub(crate) struct Search {
     pub with_curves: Rc<ConditionedProblem>,
     /// Whether anything remains that these data show.
     pub left_over: bool,
-    /// Whether what remains is so small a part of the first effect that it may be that effect's shape.
+    /// Whether what remains is so small a part of an effect that was found that it may be that effect's shape.
     pub may_be_shape: bool,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct Search {
 pub(crate) struct Found {
     /// Those names.
     pub accepted: Vec<Accepted>,
-    /// Whether what remains is so small a part of the first that it may be its shape.
+    /// Whether what remains is so small a part of an effect that was found that it may be its shape.
     pub may_be_shape: bool,
 }
 

@@ -34,7 +34,7 @@ pub use campaign::{campaign_files, campaign_json, campaign_row, campaign_text, w
 pub use comparison::comparison_text;
 pub use diagnosis_text::{concluded_text, diagnosis_text};
 pub use error::ReportError;
-pub use page::{PageKind, comparison_html, refit_json, report_html};
+pub use page::{comparison_html, live_page, refit_json, report_html};
 pub use pen::{RULED, TerminalStyle, number, plain_table, table_text};
 pub use pool_json::{POOL_SCHEMA, pool_json};
 pub use stored_diagnosis::stored_diagnosis;

@@ -3,7 +3,7 @@
 use crate::findings::Findings;
 use crate::layouts::layouts;
 use crate::mcap_file::{Attachment, write_mcap};
-use crate::page::{PageKind, report_html};
+use crate::page::report_html;
 use crate::parameters::parameters_toml;
 use crate::pool_json::{self, pool_json};
 use crate::tables::{self, parquet_files};
@@ -13,14 +13,12 @@ use armcal_recording::atomic::AtomicFile;
 use armcal_recording::{Recording, RecordingError, make_folder};
 use armcal_result::sensitivity::Basis;
 use armcal_result::{
-    CONCLUSIONS_FILE, Conclusions, ModelFile, OBSERVATIONS_FILE, RUN, ResultError, Run, SUMMARY,
+    CONCLUSIONS_FILE, Conclusions, ModelFile, OBSERVATIONS_FILE, REPORT, RUN, ResultError, Run, SUMMARY,
     model_file_name, model_files, model_of, observations_json, points,
 };
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
-/// The page.
-pub(crate) const REPORT: &str = "report.html";
 const PARAMETERS: &str = "parameters.toml";
 /// The layout for Foxglove, and the same for Foxglove Studio and Lichtblick.
 pub(crate) const LAYOUT: &str = "foxglove-layout.json";
@@ -61,7 +59,7 @@ pub fn write_all(
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
     let layouts = layouts(run, &points, &findings);
-    let page = report_html(run, &Basis::of(run), PageKind::File)?;
+    let page = report_html(run, &Basis::of(run))?;
 
     make_folder(out_dir).map_err(|source| ReportError::Folder(Box::new(source)))?;
     let mut staged = Vec::new();

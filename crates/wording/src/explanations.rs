@@ -127,7 +127,9 @@ pub fn nested_sentence(nested: &Nested) -> String {
 
 fn verdict(d: &Diagnosis) -> String {
     let rest = match (&d.unknown, d.rest_may_be_shape) {
-        (Some(_), true) => "; what is left over is so small that it may be the shape of the first effect",
+        (Some(_), true) => {
+            "; what is left over is so small that it may be the shape of an effect that was found"
+        }
         (Some(_), false) => "; something without a listed name is left over",
         (None, _) => "",
     };

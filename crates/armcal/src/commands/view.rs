@@ -5,7 +5,6 @@ use crate::error::Error;
 use crate::progress::Progress;
 use crate::view::{Given, RefitSession, serve};
 use armcal_recording::input::{Kind, read_to_string};
-use armcal_report::summary_json;
 use armcal_result::SUMMARY;
 use std::path::Path;
 
@@ -17,8 +16,7 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
     let session = RefitSession::of(given, &progress)?;
     progress.finish();
     let written = read_to_string(&input.join(SUMMARY), Kind::Data);
-    let now = summary_json(session.run())?;
-    if written.is_ok_and(|text| text != now) {
+    if written.is_ok_and(|text| text != session.summary()) {
         print(&format!(
             "{} holds other results than its pipeline and recordings give now; the page shows what they give now.\n",
             input.display()

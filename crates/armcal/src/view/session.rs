@@ -11,11 +11,11 @@ use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, Model, catalogue};
 use armcal_pipeline::Pooled;
 use armcal_recording::atomic;
-use armcal_report::{PageKind, refit_json, report_html};
+use armcal_report::{live_page, refit_json, report_html, summary_json};
 use armcal_result::sensitivity::Basis;
-use armcal_result::{Refit, Run};
+use armcal_result::{REPORT, Refit, Run, SUMMARY, attached_text};
 use armcal_stages::frames;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// A finished run, ready to be refitted.
@@ -28,19 +28,50 @@ pub struct RefitSession {
     own: Vec<EffectSpec>,
     run: Run,
     basis: Basis,
+    texts: Texts,
+}
+
+/// What results say in words.
+struct Texts {
+    page: String,
+    summary: String,
+}
+
+impl Texts {
+    /// Those of a run.
+    fn of(run: &Run, basis: &Basis) -> Result<Texts, Error> {
+        Ok(Texts { page: report_html(run, basis)?, summary: summary_json(run)? })
+    }
+
+    /// Those that a run wrote into its `run.mcap`.
+    fn read(run: &Path) -> Result<Option<Texts>, Error> {
+        let page = attached_text(run, REPORT)?;
+        Ok(page.zip(attached_text(run, SUMMARY)?).map(|(page, summary)| Texts { page, summary }))
+    }
 }
 
 impl RefitSession {
     /// Runs a pipeline, or pools `results` with it; what comes of it stays in memory.
     pub fn of(given: Given, progress: &Progress) -> Result<RefitSession, Error> {
-        let Given { pipeline: path, results, concluded } = given;
+        let Given { pipeline: path, results, concluded, run } = given;
+        let mut texts = None;
         let (pipeline, geometry, run) = match &results[..] {
             [] => {
                 let pipeline = Pipeline::load(&path)?;
-                let settled = armcal_pipeline::settle_again(&pipeline, concluded, progress)?;
+                let mut settled = armcal_pipeline::settle_again(&pipeline, concluded, progress)?;
                 let geometry = settled.fitted.geometry.clone();
-                let (mut run, _) = settled.diagnosed(&pipeline, progress);
-                armcal_pipeline::add_refits(&mut run, &pipeline, progress)?;
+                if let Some(earlier) = run.filter(|_| settled.concluded.is_some()) {
+                    texts = Texts::read(&earlier)?;
+                }
+                let run = if texts.is_some() {
+                    // What was concluded from just this calibration was also fitted and written.
+                    let diagnosis = settled.concluded.take().map(|concluded| concluded.diagnosis);
+                    Run { diagnosis, ..settled.into_run(&pipeline).0 }
+                } else {
+                    let (mut run, _) = settled.diagnosed(&pipeline, progress);
+                    armcal_pipeline::add_refits(&mut run, &pipeline, progress)?;
+                    run
+                };
                 (pipeline, geometry, run)
             }
             results => {
@@ -51,17 +82,18 @@ impl RefitSession {
         };
         let own = frames::effect_specs(&pipeline, &geometry)?;
         let basis = Basis::of(&run);
-        Ok(RefitSession { pipeline, path, geometry, own, run, basis })
+        let texts = texts.map_or_else(|| Texts::of(&run, &basis), Ok)?;
+        Ok(RefitSession { pipeline, path, geometry, own, run, basis, texts })
     }
 
-    /// The run.
-    pub fn run(&self) -> &Run {
-        &self.run
+    /// What `summary.json` of the run says.
+    pub fn summary(&self) -> &str {
+        &self.texts.summary
     }
 
     /// The page.
-    pub fn html(&self) -> Result<String, Error> {
-        Ok(report_html(&self.run, &self.basis, PageKind::Live)?)
+    pub fn html(&self) -> String {
+        live_page(&self.texts.page).unwrap_or_else(|| self.texts.page.clone())
     }
 
     /// What can be chosen.

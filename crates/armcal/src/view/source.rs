@@ -37,20 +37,23 @@ pub struct Given {
     pub results: Vec<PathBuf>,
     /// What the run concluded whose results were named.
     pub concluded: Option<Conclusions>,
+    /// The results that were named.
+    pub run: Option<PathBuf>,
 }
 
 impl Given {
     /// By a pipeline file, a `run.mcap`, or its folder.
     pub fn by(input: &Path) -> Result<Given, Error> {
         let (pipeline, results) = source_of(input)?;
-        let concluded = if pipeline == input { None } else { Conclusions::open(input)? };
-        Ok(Given { pipeline, results, concluded })
+        let run = (pipeline != input).then(|| input.to_owned());
+        let concluded = run.as_deref().map(Conclusions::open).transpose()?.flatten();
+        Ok(Given { pipeline, results, concluded, run })
     }
 
     /// The same of what is no pool. What has no note of its pipeline is read as one, to be refused for what it is.
     pub fn alone(input: &Path) -> Result<Given, Error> {
         if folder_of(input).is_none_or(|folder| !folder.join(FILE).exists()) {
-            return Ok(Given { pipeline: input.to_owned(), results: Vec::new(), concluded: None });
+            return Ok(Given { pipeline: input.to_owned(), results: Vec::new(), concluded: None, run: None });
         }
         let given = Given::by(input)?;
         if given.results.is_empty() {

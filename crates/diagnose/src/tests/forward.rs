@@ -46,6 +46,45 @@ fn steps_together_must_say_more_than_an_unlisted_shape_and_what_they_cost() {
 }
 
 #[test]
+fn four_steps_without_a_name_end_the_search_where_they_say_no_more_than_an_unlisted_shape() {
+    let c = own(&planted(&[], 0, 1), "backlash:1");
+    let ends = |unlisted: f64, named: [bool; 4]| {
+        let steps = named.map(|n| step(c.clone(), [10.0, unlisted], n));
+        patience_ends(&steps, &quick())
+    };
+    // 40 nats together, 3 for each of the four.
+    assert!(ends(28.1, [false; 4]) && !ends(28.0, [false; 4]));
+    assert!(!ends(99.0, [true, false, false, false]) && !ends(99.0, [false, false, false, true]));
+}
+
+#[test]
+fn of_what_is_refused_that_leaves_which_says_least() {
+    let p = planted(&[("backlash:1", 1.0)], 0, 3);
+    let conditioned = conditioned(&p, &quick());
+    let verdict = conditioned.judge(entry(&conditioned.weighed, "backlash:1"), &quick());
+    let with = |(grade, nats): (Grade, f64)| {
+        let mut judged = verdict.clone();
+        judged.gain.nats = nats;
+        Accepted {
+            candidate: own(&p, "backlash:1"),
+            judged,
+            conditioned: conditioned.clone(),
+            grade,
+            set: vec![0],
+            instead_of: Vec::new(),
+            ranked: Vec::new(),
+        }
+    };
+    let of = |all: &[(Grade, f64)]| weakest(&all.iter().copied().map(with).collect::<Vec<_>>());
+    use Grade::{Named, OrUnlisted, Refused};
+    assert_eq!(
+        of(&[(Named, -5.0), (Refused, 9.0), (Refused, 7.0), (OrUnlisted, 1.0), (Refused, 8.0)]),
+        Some(2)
+    );
+    assert_eq!(of(&[(Named, -5.0), (OrUnlisted, 1.0)]), None);
+}
+
+#[test]
 fn what_switches_leaves_only_what_switches_alike() {
     let p = planted(&[], 0, 1);
     let alike = |a: &str, b: &str| switches_alike(&own(&p, a), &own(&p, b));
@@ -235,22 +274,32 @@ fn the_fall_is_in_units_of_the_declared_noise() {
 }
 
 #[test]
-fn a_small_rest_that_switches_alike_may_be_the_first_effects_shape() {
-    let p = planted(&[("backlash:1", 2.0), ("backlash:3", 0.6)], 60, 3);
-    let (steps, may_be_shape) = stepped(&p, Vec::new(), &quick());
-    assert_eq!((names(&steps), may_be_shape), (vec!["backlash:1", "backlash:3"], false));
-    let share = steps[1].fall / steps[0].fall;
-    assert!(share > 0.01 && share < 0.9);
+fn a_detail_is_small_in_the_squared_error_and_in_the_score_and_switches_alike() {
+    let p = planted(&[], 0, 1);
+    let earlier = |spec: &str| Step { fall: 1000.0, ..step(own(&p, spec), [300.0, 0.0], true) };
+    let is_detail = |of: &str, fall: f64, nats: f64| {
+        let rest = Step { fall, ..step(own(&p, "eccentricity:3"), [nats, 0.0], true) };
+        rest.may_be_detail_of(&earlier(of), &quick())
+    };
+    assert!(is_detail("eccentricity:2", 9.9, 44.9));
+    assert!(!is_detail("eccentricity:2", 10.0, 44.9) && !is_detail("eccentricity:2", 9.9, 45.0));
+    assert!(!is_detail("backlash:1", 9.9, 44.9), "an eccentricity is no shape of a play");
+    let confirmed = Step::known(own(&p, "eccentricity:2"), 1000.0);
+    let rest = Step { fall: 9.9, ..step(own(&p, "eccentricity:3"), [500.0, 0.0], true) };
+    assert!(rest.may_be_detail_of(&confirmed, &quick()));
+}
+
+#[test]
+fn steps_end_where_the_next_one_may_be_a_detail_of_any_before_it() {
+    let two = ["backlash:1", "eccentricity:2"];
+    let p = planted(&[(two[0], 2.0), (two[1], 4.0), ("eccentricity:3", 0.4)], 60, 3);
     let at = |leftover_share| stepped(&p, Vec::new(), &DiagnosisConfig { leftover_share, ..quick() });
+    let (steps, may_be_shape) = at(1e-4);
+    assert_eq!((&names(&steps)[..2], steps.len(), may_be_shape), (&two[..], 3, false));
+    let share = steps[2].fall / steps[1].fall;
+    assert!(steps[2].gain_nats < 0.15 * steps[1].gain_nats, "{} {}", steps[2].gain_nats, steps[1].gain_nats);
     let (steps, may_be_shape) = at(1.1 * share);
-    assert_eq!((names(&steps), may_be_shape), (vec!["backlash:1"], true));
-    let (steps, may_be_shape) = at(0.9 * share);
-    assert_eq!((steps.len(), may_be_shape), (2, false));
-    // A drift is no shape of a play, however small.
-    let p = planted(&[("backlash:1", 2.0), ("zero_drift:3", 1.0)], 0, 3);
-    let config = DiagnosisConfig { leftover_share: 0.9, ..quick() };
-    let (steps, may_be_shape) = stepped(&p, Vec::new(), &config);
-    assert_eq!((steps.len(), may_be_shape), (2, false));
+    assert_eq!((names(&steps), may_be_shape), (two.to_vec(), true));
 }
 
 /// Says once that a candidate acts otherwise at its own size.

@@ -7,9 +7,9 @@
 //! # Equation
 //! `dq = -(b/2) s`, `s = +1` where the joint arrived moving towards +q. Where the recording shows the path of the
 //! encoder, the play operator on it, `w <- max(q - b/2, min(q + b/2, w))`, `dq = w - q`, which is also right when
-//! the last move was shorter than the gap. Below 0.3 deg, where a servo's overshoot is a move of its own, `dq` is in
-//! proportion to b, as large as the play operator makes it at 0.3 deg. Negative b: `dq = -(b/2) s` with s the direction
-//! of the encoder's last move, however small, because a link that leads pushes the encoder from the flank it touches.
+//! the last move was shorter than the gap. At b = 0, where a fit begins and a servo's overshoot would decide, its derivative is
+//! the slope up to a gap of 0.3 deg. Negative b: `dq = -(b/2) s` with s the direction of the encoder's last move, however
+//! small, because a link that leads pushes the encoder from the flank it touches.
 //!
 //! # Parameters and units
 //! `width` b [rad] (sliding joint: [m]). Signed: negative where the link leads, as in an arm guided by hand; never where
@@ -33,7 +33,7 @@
 //! Slamani, Nubiola, Bonev 2012 (Industrial Robot 39:4); play operator: Visintin, Differential Models of
 //! Hysteresis, 1994, ch. III.
 
-use super::play::{RESOLVED_DEG, lagging};
+use super::play::{BEGUN_DEG, lagging};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -52,21 +52,21 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct Backlash {
     joint: usize,
-    resolved: f64,
+    begun: f64,
 }
 
 fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     let (typical, bound) = (context.joint_size(joint, 0.5), context.joint_size(joint, 8.0));
     let width = amplitude("width", context.joint_unit(joint), typical, bound, "width of the gap");
-    let resolved = context.joint_size(joint, RESOLVED_DEG);
-    Ok(Placement::new(vec![width], Backlash { joint, resolved }))
+    let begun = context.joint_size(joint, BEGUN_DEG);
+    Ok(Placement::new(vec![width], Backlash { joint, begun }))
 }
 
 impl Physics for Backlash {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let memory = x.path_memory_rad(self.joint);
-        change.joint(self.joint, lagging(theta[0], self.resolved, memory, x.arrival[self.joint]));
+        change.joint(self.joint, lagging(theta[0], self.begun, memory, x.arrival[self.joint]));
     }
 
     fn gap(&self, theta: &[f64]) -> Option<(usize, f64)> {

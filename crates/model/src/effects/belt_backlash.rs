@@ -24,7 +24,7 @@
 //! # Source
 //! Play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III; layout of the paper's arm.
 
-use super::play::{RESOLVED_DEG, lagging};
+use super::play::{BEGUN_DEG, lagging};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -60,6 +60,6 @@ impl Physics for BeltBacklash {
         let sum = self.sense * x.arrival[self.joint - 1] + x.arrival[self.joint];
         let direction = if sum == 0.0 { 0.0 } else { sum.signum() };
         let memory = x.pair_memory_rad(self.joint, self.sense);
-        change.joint(self.joint, lagging(theta[0], RESOLVED_DEG.to_radians(), memory, direction));
+        change.joint(self.joint, lagging(theta[0], BEGUN_DEG.to_radians(), memory, direction));
     }
 }

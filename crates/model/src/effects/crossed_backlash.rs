@@ -6,8 +6,8 @@
 //!
 //! # Equation
 //! `dq_j = -(b/2) s_i`. Where the recording shows the path of joint i, the play operator on it: what is dragged along
-//! follows joint i until its spring is stronger than the friction, and turns back as slowly. Below 0.3 deg in proportion
-//! to b, as in `backlash`.
+//! follows joint i until its spring is stronger than the friction, and turns back as slowly. The derivative at b = 0 as in
+//! `backlash`.
 //!
 //! # Parameters and units
 //! `width` b [rad] (sliding joint: [m]), negative where j is dragged along with i; `from` i names the joint whose
@@ -24,7 +24,7 @@
 //! # Source
 //! Dahl's friction with a sharp slip is the play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III.
 
-use super::play::{RESOLVED_DEG, following};
+use super::play::{BEGUN_DEG, following};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -58,7 +58,7 @@ const FEW_JOINTS: usize = 4;
 struct CrossedBacklash {
     joint: usize,
     from: usize,
-    resolved: f64,
+    begun: f64,
     /// Of the unit of j per unit of i, where one of them slides.
     per_unit: f64,
 }
@@ -77,9 +77,9 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
         bound,
         "difference between the two directions",
     );
-    let resolved = context.joint_size(from, RESOLVED_DEG);
+    let begun = context.joint_size(from, BEGUN_DEG);
     let per_unit = context.joint_size(joint, 1.0) / context.joint_size(from, 1.0);
-    Ok(Placement::new(vec![width], CrossedBacklash { joint, from, resolved, per_unit }))
+    Ok(Placement::new(vec![width], CrossedBacklash { joint, from, begun, per_unit }))
 }
 
 fn others(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
@@ -92,7 +92,7 @@ fn others(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64
 impl Physics for CrossedBacklash {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let width = theta[0] * self.per_unit.recip();
-        let dragged = following(width, self.resolved, x.path_memory_rad(self.from), x.arrival[self.from]);
+        let dragged = following(width, self.begun, x.path_memory_rad(self.from), x.arrival[self.from]);
         change.joint(self.joint, dragged * self.per_unit);
     }
 }

@@ -25,7 +25,7 @@
 //! Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:7): stick and slip;
 //! Visintin, Differential Models of Hysteresis, 1994, ch. III: the play operator.
 
-use super::play::{RESOLVED_DEG, lagging};
+use super::play::{BEGUN_DEG, lagging};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -65,6 +65,6 @@ impl Physics for FrictionWindup {
         let load = torque.total_nm().abs() - links;
         let windup = self.shares.sum(theta, links, outer, load);
         let (memory, arrival) = (x.path_memory_rad(self.joint), x.arrival[self.joint]);
-        change.joint(self.joint, lagging(windup * 2.0, RESOLVED_DEG.to_radians(), memory, arrival));
+        change.joint(self.joint, lagging(windup * 2.0, BEGUN_DEG.to_radians(), memory, arrival));
     }
 }

@@ -29,16 +29,17 @@ pub(crate) fn lost_motion_rad<D: Scalar>(width: D, memory_rad: &[f64]) -> D {
     (link - encoder) * sign
 }
 
-/// Widths below this one are not resolved [deg]: moves as small as a servo's overshoot decide what they do.
-pub(super) const RESOLVED_DEG: f64 = 0.3;
+/// The way a fit takes from zero is that of a gap of this width [deg]: the smallest moves, which decide what happens in a gap without
+/// width, are those of a servo's overshoot.
+pub(super) const BEGUN_DEG: f64 = 0.3;
 
-/// [`lost_motion_rad`] of a width that starts from zero: below `resolved` in proportion, as large as it is there;
-/// without a remembered path by the direction of `arrival`.
-pub(super) fn following<D: Scalar>(width: D, resolved: f64, memory: &[f64], arrival: f64) -> D {
+/// [`lost_motion_rad`] of a width that a fit begins with at zero: there it grows in proportion, as to a gap that has `begun`.
+/// Without a remembered path by the direction of `arrival`.
+pub(super) fn following<D: Scalar>(width: D, begun: f64, memory: &[f64], arrival: f64) -> D {
     if memory.len() < 2 {
         width * (-0.5 * arrival)
-    } else if width.re().abs() < resolved {
-        width * (lost_motion_rad(resolved, memory) / resolved)
+    } else if width.re() == 0.0 {
+        width * (lost_motion_rad(begun, memory) / begun)
     } else {
         lost_motion_rad(width, memory)
     }
@@ -47,13 +48,13 @@ pub(super) fn following<D: Scalar>(width: D, resolved: f64, memory: &[f64], arri
 /// [`following`], for a joint that may be led by hand: where the width is negative the link leads, and an encoder that
 /// moved, however little, was pushed by the flank it was pushed from; what the link did within its gap afterwards
 /// nobody recorded.
-pub(super) fn lagging<D: Scalar>(width: D, resolved: f64, memory: &[f64], arrival: f64) -> D {
+pub(super) fn lagging<D: Scalar>(width: D, begun: f64, memory: &[f64], arrival: f64) -> D {
     match memory {
-        [.., before, rest] if width.re() <= -resolved => {
+        [.., before, rest] if width.re() < 0.0 => {
             let last_move = if rest == before { 0.0 } else { (rest - before).signum() };
             width * (-0.5 * last_move)
         }
-        _ => following(width, resolved, memory, arrival),
+        _ => following(width, begun, memory, arrival),
     }
 }
 

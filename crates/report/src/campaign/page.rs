@@ -34,7 +34,7 @@ impl<'a> CampaignPage<'a> {
         let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")];
         let name = &campaign.pipeline;
         let names = (format!("{name}, campaign"), format!("{name} · every recording calibrated by itself"));
-        let shell = Shell::new("campaign-page", names, &scripts, &document(campaign), "'none'")?;
+        let shell = Shell::new("campaign-page", names, &scripts, &document(campaign))?;
         let story = campaign_story(campaign);
         let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
         Ok(CampaignPage {

@@ -26,7 +26,7 @@ pub fn comparison_html(
     let title = format!("{} and {}", before.pipeline, after.pipeline);
     let scripts = [embed::TEXT, embed::CHART, include_str!("assets/compared.js")];
     let document = document(before, after, comparison);
-    let shell = Shell::new("comparison-page", (title, kicker), &scripts, &document, "'none'")?;
+    let shell = Shell::new("comparison-page", (title, kicker), &scripts, &document)?;
     Ok(ComparePage { shell: shell.saying(comparison_sentence(comparison)), comparison }.render()?)
 }
 

@@ -52,29 +52,24 @@ const SCRIPTS: [&str; 12] = [
     include_str!("assets/live.js"),
 ];
 
-/// Whether a page stands alone or has a server that refits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PageKind {
-    /// A file that is opened from disk.
-    File,
-    /// Served by `armcal view`.
-    Live,
-}
+/// What differs in a page that has a server which refits: whom it may talk to, and whether it shows its form.
+const LIVE: [[&str; 2]; 2] = [
+    ["connect-src &#39;none&#39;", "connect-src &#39;self&#39;"],
+    ["<section id=\"live\" class=\"no-print\" hidden>", "<section id=\"live\" class=\"no-print\">"],
+];
 
 /// The run as one HTML page.
 ///
 /// # Errors
 /// A template or document that cannot be written.
-pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, ReportError> {
+pub fn report_html(run: &Run, basis: &Basis) -> Result<String, ReportError> {
     let story = Story::of(run);
-    let connect = if kind == PageKind::Live { "'self'" } else { "'none'" };
     let title = run.pipeline_name.clone();
     let about = about(run).map(|about| format!("{title} · {about}"));
     let kicker = about.unwrap_or_else(|| title.clone());
-    let shell = Shell::new("report-page", (title, kicker), &SCRIPTS, &Document::of(run, basis), connect)?;
+    let shell = Shell::new("report-page", (title, kicker), &SCRIPTS, &Document::of(run, basis))?;
     let page = ReportPage {
         shell: shell.telling(&story),
-        live: kind == PageKind::Live,
         verdict: verdict(run),
         run,
         recordings: quality::recordings(run),
@@ -84,6 +79,13 @@ pub fn report_html(run: &Run, basis: &Basis, kind: PageKind) -> Result<String, R
         warnings: &story.warnings,
     };
     Ok(page.render()?)
+}
+
+/// The page of a run as `armcal view` serves it; none of a text that is no such page.
+pub fn live_page(page: &str) -> Option<String> {
+    LIVE.iter().try_fold(page.to_owned(), |page, [file, live]| {
+        page.contains(file).then(|| page.replacen(file, live, 1))
+    })
 }
 
 /// A refit of the run as JSON, as the page's document holds it.
@@ -98,7 +100,6 @@ pub fn refit_json(run: &Run, basis: &Basis, refit: &Refit) -> Result<String, Rep
 #[template(path = "report.html")]
 struct ReportPage<'a> {
     shell: Shell,
-    live: bool,
     verdict: Verdict,
     run: &'a Run,
     recordings: Vec<quality::RecordingRow<'a>>,

@@ -34,7 +34,7 @@ pub(crate) struct Shell {
 }
 
 impl Shell {
-    /// A page of this kind that runs these scripts over this document, and talks to nobody but `connect`.
+    /// A page of this kind that runs these scripts over this document and talks to nobody.
     ///
     /// # Errors
     /// A document that cannot be written.
@@ -43,7 +43,6 @@ impl Shell {
         (title, kicker): (String, String),
         scripts: &[&str],
         document: &impl Serialize,
-        connect: &str,
     ) -> Result<Shell, ReportError> {
         let script = embed::script(scripts);
         Ok(Shell {
@@ -58,7 +57,7 @@ impl Shell {
             version: VERSION,
             style: embed::STYLE,
             plotly: embed::PLOTLY,
-            policy: embed::policy(&[embed::PLOTLY, &script], connect),
+            policy: embed::policy(&[embed::PLOTLY, &script]),
             data: embed::json_for_html(document)?,
             script,
         })

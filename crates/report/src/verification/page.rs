@@ -28,7 +28,7 @@ pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
     let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/verified.js")];
     // What the page's script draws.
     let document = json!({ "motions": motions(&v.samples) });
-    let shell = Shell::new("verification-page", names, &scripts, &document, "'none'")?;
+    let shell = Shell::new("verification-page", names, &scripts, &document)?;
     let recordings = RecordingNames::new(v.recordings.iter().map(|r| r.name.clone()));
     let told = v.warnings.iter().map(|w| ToldWarning::new(&recordings, None, w)).collect();
     let page = VerificationPage {

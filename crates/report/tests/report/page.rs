@@ -2,7 +2,7 @@
 
 use crate::synthetic::{HOSTILE, synthetic};
 use armcal_core::DwellId;
-use armcal_report::{PageKind, report_html, summary_json};
+use armcal_report::{live_page, report_html, summary_json};
 use armcal_result::Refit;
 use armcal_result::sensitivity::Basis;
 use serde_json::Value;
@@ -19,7 +19,7 @@ fn document(page: &str) -> Value {
 #[test]
 fn the_page_shows_the_numbers_of_the_summary() {
     let run = synthetic().run;
-    let page = report_html(&run, &Basis::of(&run), PageKind::File).unwrap();
+    let page = report_html(&run, &Basis::of(&run)).unwrap();
     let (document, summary) =
         (document(&page), serde_json::from_str::<Value>(&summary_json(&run).unwrap()).unwrap());
     for side in ["train", "holdout"] {
@@ -56,7 +56,7 @@ fn a_joint_that_is_off_is_seen_off_by_as_much() {
         // Where the tip is when the link is further than the encoder says.
         r.fitted_m = run.model.predicted_tip_in_world(&p, &turned) - run.model.predicted_tip_in_world(&p, o);
     }
-    let page = document(&report_html(&run, &Basis::of(&run), PageKind::File).unwrap());
+    let page = document(&report_html(&run, &Basis::of(&run)).unwrap());
     assert_eq!(page["channels"][1]["unit"], "deg");
     let implied = page["refits"][0]["implied"][1].as_array().unwrap();
     assert!(!implied.is_empty());
@@ -70,7 +70,7 @@ fn a_joint_that_is_off_is_seen_off_by_as_much() {
 fn no_name_becomes_markup() {
     let mut run = synthetic().run;
     run.pipeline_name = HOSTILE.into();
-    let page = report_html(&run, &Basis::of(&run), PageKind::File).unwrap();
+    let page = report_html(&run, &Basis::of(&run)).unwrap();
     // Three scripts: the document, the charting library, the page's own.
     assert_eq!(page.matches("<script").count(), 3 + page.matches("\"<script").count());
     assert!(!page.contains("</script>\n/../"), "the name ended an element");
@@ -84,15 +84,15 @@ fn no_name_becomes_markup() {
 #[test]
 fn a_page_from_disk_may_talk_to_nobody() {
     let run = synthetic().run;
-    let basis = Basis::of(&run);
-    let policy = |kind| {
-        let page = report_html(&run, &basis, kind).unwrap();
+    let page = report_html(&run, &Basis::of(&run)).unwrap();
+    let policy = |page: &str| {
         let from = page.find("Content-Security-Policy").unwrap();
         page[from..from + 400].to_owned()
     };
-    let (file, live) = (policy(PageKind::File), policy(PageKind::Live));
+    let (file, live) = (policy(&page), policy(&live_page(&page).unwrap()));
     assert!(file.contains("default-src ") && file.contains("connect-src &#39;none&#39;"), "{file}");
     assert!(live.contains("connect-src &#39;self&#39;"), "{live}");
+    assert_eq!(live_page("<h1>of another program</h1>"), None);
 }
 
 /// A long session with every refit that a run embeds; left where a browser can be pointed at it.
@@ -119,7 +119,7 @@ fn two_thousand_dwells_stay_under_five_megabytes() {
         Refit { effects: vec![format!("refit {k}")], model, calibration }
     };
     run.alternatives = (1..=10).map(refit).collect();
-    let page = report_html(&run, &Basis::of(&run), PageKind::File).unwrap();
+    let page = report_html(&run, &Basis::of(&run)).unwrap();
     assert!(page.len() < 5_000_000, "{} bytes", page.len());
     std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("report-2000.html"), page).unwrap();
 }

@@ -5,7 +5,7 @@ use crate::recording::{get, own, read, string, write};
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_config::InputMessages;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{Detail, PageKind, TerminalStyle, report_html, summary_json, terminal};
+use armcal_report::{Detail, TerminalStyle, report_html, summary_json, terminal};
 use armcal_result::Status;
 use armcal_result::sensitivity::Basis;
 
@@ -79,7 +79,7 @@ fn people_are_told_names_of_recordings_and_programs_their_indices() {
                 (tool_shift@1.4) tell of it";
     said(&s, "named");
     assert!(flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything)).contains(told));
-    let page = report_html(&s.run, &Basis::of(&s.run), PageKind::File).unwrap();
+    let page = report_html(&s.run, &Basis::of(&s.run)).unwrap();
     let [subject_told, message_told] = told.split_once(": ").map(|(a, b)| [a, b]).unwrap();
     assert!(flat(&page).contains(&format!("<td>{subject_told}</td><td>{message_told}</td>")));
     let summary = summary_json(&s.run).unwrap();

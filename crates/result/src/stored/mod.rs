@@ -8,5 +8,8 @@ pub use model::{model_of, open_model, visited};
 pub use observations::{
     BoardFacts, OBSERVATIONS_FILE, ObservedRecording, StartFrame, StoredObservations, observations_json,
 };
-pub use run::{RUN, SUMMARY, StoredDwell, StoredRecording, StoredResidual, StoredResultError, StoredRun};
-pub(crate) use run::{attachment, run_file, stored_text};
+pub use run::{
+    REPORT, RUN, SUMMARY, StoredDwell, StoredRecording, StoredResidual, StoredResultError, StoredRun,
+    attached_text,
+};
+pub(crate) use run::{attachment, stored_text};

@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub const RUN: &str = "run.mcap";
 /// Name of its summary.
 pub const SUMMARY: &str = "summary.json";
+/// Name of the page.
+pub const REPORT: &str = "report.html";
 
 /// Results of an earlier run.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,6 +127,14 @@ pub fn stored_text(
 /// The `run.mcap` that a path means: itself, or that in the folder.
 pub fn run_file(path: &Path) -> PathBuf {
     if path.is_dir() { path.join(RUN) } else { path.to_owned() }
+}
+
+/// The text that a run attached to its `run.mcap` by this name; results may be named by their folder.
+///
+/// # Errors
+/// Results that cannot be read.
+pub fn attached_text(results: &Path, name: &str) -> Result<Option<String>, StoredResultError> {
+    attachment(&run_file(results), name)
 }
 
 /// The text that armcal attached to a `run.mcap` by this name.

@@ -170,6 +170,14 @@ fn backlash_lags_behind_the_motion() {
     let link = model.tip_in_base(&model.nominal(), &[0.203, 0.1, -0.3]).translation.vector
         - model.tip_in_base(&model.nominal(), &[0.2, 0.1, -0.3]).translation.vector;
     assert!((held - link).norm() < 1e-15);
+    // A small gap is a gap too; a link that leads stands on the flank that the last move was pushed from, however small that was.
+    o.path_memory_rad = Some(vec![vec![0.5, 0.1995, 0.2], vec![0.1], vec![-0.3]]);
+    for (width, at) in [(0.003, 0.201), (-0.003, 0.2015)] {
+        let held = motion_m("backlash:1", "width", width, &o);
+        let link = model.tip_in_base(&model.nominal(), &[at, 0.1, -0.3]).translation.vector
+            - model.tip_in_base(&model.nominal(), &[0.2, 0.1, -0.3]).translation.vector;
+        assert!((held - link).norm() < 1e-15, "{width}");
+    }
     // Nobody knows where joint 2 came from.
     o.arrival[1] = Arrival::Unknown;
     assert_eq!(motion_m("backlash:2", "width", 0.01, &o), Vector3::zeros());

@@ -110,7 +110,7 @@ function start() {
   chart($("time"), timeFigure);
   chart($("groups"), groupFigure);
   part(redraw);
-  if ($("live")) live();
+  if (!$("live").hidden) live();
   $("reset").addEventListener("click", () => show(base(), "as calibrated"));
   $("show-found").addEventListener("click", () => show(found(), "with what was found"));
   $("rescale").addEventListener("change", redraw);
