@@ -34,7 +34,7 @@ pub fn serve(
     listener.set_nonblocking(true).map_err(failed("listening"))?;
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
-    let html = Bytes::from(session.html());
+    let html = Bytes::from(session.html().to_owned());
     let app = routes(Arc::new(Served { session, html, turns: Turns::new() }), guard);
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     // A thread each for the one that is computed and those that are written.

@@ -33,19 +33,22 @@ pub struct RefitSession {
 
 /// What results say in words.
 struct Texts {
+    /// The page that is served.
     page: String,
+    /// `summary.json`.
     summary: String,
 }
 
 impl Texts {
     /// Those of a run.
     fn of(run: &Run, basis: &Basis) -> Result<Texts, Error> {
-        Ok(Texts { page: report_html(run, basis)?, summary: summary_json(run)? })
+        let page = report_html(run, basis)?;
+        Ok(Texts { page: live_page(&page).unwrap_or(page), summary: summary_json(run)? })
     }
 
-    /// Those that a run wrote into its `run.mcap`.
+    /// Those that a run wrote into its `run.mcap`; none where that page cannot be served.
     fn read(run: &Path) -> Result<Option<Texts>, Error> {
-        let page = attached_text(run, REPORT)?;
+        let page = attached_text(run, REPORT)?.and_then(|page| live_page(&page));
         Ok(page.zip(attached_text(run, SUMMARY)?).map(|(page, summary)| Texts { page, summary }))
     }
 }
@@ -92,8 +95,8 @@ impl RefitSession {
     }
 
     /// The page.
-    pub fn html(&self) -> String {
-        live_page(&self.texts.page).unwrap_or_else(|| self.texts.page.clone())
+    pub fn html(&self) -> &str {
+        &self.texts.page
     }
 
     /// What can be chosen.
