@@ -204,13 +204,8 @@ fn answer(
         let freedom = |other: usize| (costs.of_entry(other) - costs.of_entry(*k)).max(0.0);
         let beats = |(l, other): &(usize, Score)| other.above(score).less(freedom(*l)).is_clear(detail);
         let beaten = refits.iter().any(beats);
-        // That something acts, the name that was found has shown; whether it is this one, what is not listed may refute.
-        let refuted = || {
-            let mut judged = conditioned.judge(*k, config);
-            judged.refitted(score.clone(), nothing);
-            judged.is_refuted(config)
-        };
-        !beaten && (*k == found.judged.entry || !refuted()) && score.above(nothing).nats >= config.margin_nats
+        let real = *k == found.judged.entry || conditioned.judge(*k, config).grade(config) > Grade::Refused;
+        !beaten && real && score.above(nothing).nats >= config.margin_nats
     };
     let set = simplest_first(refits.iter().filter(stands).collect(), costs);
     let (acts, others): (Vec<usize>, Vec<usize>) = set.iter().partition(|k| of(**k).known.is_some());

@@ -4,7 +4,7 @@
 use crate::called::Called;
 use crate::error::ResultError;
 use crate::run::{Run, VERSION};
-use crate::stored::{StoredResultError, attached_text};
+use crate::stored::{StoredResultError, attached_texts};
 use armcal_calibrate::Calibration;
 use armcal_core::{Observation, SetupReport};
 use armcal_diagnose::{Calibrated, Diagnosis};
@@ -84,7 +84,7 @@ impl Conclusions {
     /// # Errors
     /// Results that cannot be read.
     pub fn open(path: &Path) -> Result<Option<Conclusions>, StoredResultError> {
-        let text = attached_text(path, FILE)?;
+        let [text] = attached_texts(path, [FILE])?;
         let read = text.and_then(|text| toml::from_str::<Conclusions>(&text).ok());
         Ok(read.filter(|own| own.schema == SCHEMA))
     }

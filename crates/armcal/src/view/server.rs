@@ -34,8 +34,7 @@ pub fn serve(
     listener.set_nonblocking(true).map_err(failed("listening"))?;
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
-    let html = Bytes::from(session.html().to_owned());
-    let app = routes(Arc::new(Served { session, html, turns: Turns::new() }), guard);
+    let app = routes(Arc::new(Served { session, turns: Turns::new() }), guard);
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     // A thread each for the one that is computed and those that are written.
     let runtime =
@@ -50,7 +49,6 @@ pub fn serve(
 
 struct Served {
     session: RefitSession,
-    html: Bytes,
     turns: Turns,
 }
 
@@ -100,7 +98,7 @@ async fn arrived(request: Request, next: Next) -> Response {
 }
 
 async fn page(State(served): State<Arc<Served>>) -> Response {
-    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], served.html.clone()).into_response()
+    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], served.session.html().to_owned()).into_response()
 }
 
 async fn choices(State(served): State<Arc<Served>>) -> Response {

@@ -13,7 +13,7 @@ use armcal_pipeline::Pooled;
 use armcal_recording::atomic;
 use armcal_report::{live_page, refit_json, report_html, summary_json};
 use armcal_result::sensitivity::Basis;
-use armcal_result::{REPORT, Refit, Run, SUMMARY, attached_text};
+use armcal_result::{REPORT, Refit, Run, SUMMARY, attached_texts};
 use armcal_stages::frames;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -48,8 +48,8 @@ impl Texts {
 
     /// Those that a run wrote into its `run.mcap`; none where that page cannot be served.
     fn read(run: &Path) -> Result<Option<Texts>, Error> {
-        let page = attached_text(run, REPORT)?.and_then(|page| live_page(&page));
-        Ok(page.zip(attached_text(run, SUMMARY)?).map(|(page, summary)| Texts { page, summary }))
+        let [page, summary] = attached_texts(run, [REPORT, SUMMARY])?;
+        Ok(page.and_then(|page| live_page(&page)).zip(summary).map(|(page, summary)| Texts { page, summary }))
     }
 }
 
@@ -57,15 +57,13 @@ impl RefitSession {
     /// Runs a pipeline, or pools `results` with it; what comes of it stays in memory.
     pub fn of(given: Given, progress: &Progress) -> Result<RefitSession, Error> {
         let Given { pipeline: path, results, concluded, run } = given;
-        let mut texts = None;
-        let (pipeline, geometry, run) = match &results[..] {
+        let (pipeline, geometry, run, texts) = match &results[..] {
             [] => {
                 let pipeline = Pipeline::load(&path)?;
                 let mut settled = armcal_pipeline::settle_again(&pipeline, concluded, progress)?;
                 let geometry = settled.fitted.geometry.clone();
-                if let Some(earlier) = run.filter(|_| settled.concluded.is_some()) {
-                    texts = Texts::read(&earlier)?;
-                }
+                let earlier = run.filter(|_| settled.concluded.is_some());
+                let texts = earlier.as_deref().map(Texts::read).transpose()?.flatten();
                 let run = if texts.is_some() {
                     // What was concluded from just this calibration was also fitted and written.
                     let diagnosis = settled.concluded.take().map(|concluded| concluded.diagnosis);
@@ -75,12 +73,12 @@ impl RefitSession {
                     armcal_pipeline::add_refits(&mut run, &pipeline, progress)?;
                     run
                 };
-                (pipeline, geometry, run)
+                (pipeline, geometry, run, texts)
             }
             results => {
                 let pipeline = Pipeline::load_for_others(&path)?;
                 let Pooled { run, geometry } = armcal_pipeline::pool(&pipeline, results, progress)?;
-                (pipeline, geometry, run)
+                (pipeline, geometry, run, None)
             }
         };
         let own = frames::effect_specs(&pipeline, &geometry)?;

@@ -8,8 +8,8 @@ pub use model::{model_of, open_model, visited};
 pub use observations::{
     BoardFacts, OBSERVATIONS_FILE, ObservedRecording, StartFrame, StoredObservations, observations_json,
 };
+pub(crate) use run::stored_text;
 pub use run::{
     REPORT, RUN, SUMMARY, StoredDwell, StoredRecording, StoredResidual, StoredResultError, StoredRun,
-    attached_text,
+    attached_texts,
 };
-pub(crate) use run::{attachment, stored_text};

@@ -3,7 +3,7 @@
 use crate::StoredResultError;
 use crate::error::ResultError;
 use crate::run::{RecordingRun, Run, VERSION};
-use crate::stored::{attachment, stored_text};
+use crate::stored::{attached_texts, stored_text};
 use armcal_core::{DwellMark, FeatureId, Observation, Pose, Unit, Visited};
 use armcal_model::{Chain, EffectSpec, EffectTable, Model};
 use armcal_model_file::{
@@ -103,7 +103,8 @@ fn file(path: &Path) -> Result<String, StoredResultError> {
 
 fn attached(path: &Path) -> Result<String, StoredResultError> {
     let why = || format!("it has no attachment armcal/{FILE}");
-    attachment(path, FILE)?.ok_or_else(|| StoredResultError::NoModel { path: path.to_owned(), why: why() })
+    let [text] = attached_texts(path, [FILE])?;
+    text.ok_or_else(|| StoredResultError::NoModel { path: path.to_owned(), why: why() })
 }
 
 /// The files of the nominal arms; the ends of a URDF chain are what the pipeline says.

@@ -129,27 +129,31 @@ pub fn run_file(path: &Path) -> PathBuf {
     if path.is_dir() { path.join(RUN) } else { path.to_owned() }
 }
 
-/// The text that a run attached to its `run.mcap` by this name; results may be named by their folder.
+/// The texts that armcal attached by these names to a `run.mcap`, which its folder may stand for.
 ///
 /// # Errors
 /// Results that cannot be read.
-pub fn attached_text(results: &Path, name: &str) -> Result<Option<String>, StoredResultError> {
-    attachment(&run_file(results), name)
-}
-
-/// The text that armcal attached to a `run.mcap` by this name.
-pub fn attachment(path: &Path, name: &str) -> Result<Option<String>, StoredResultError> {
-    let at = |source| StoredResultError::Open { path: path.to_owned(), source: Box::new(source) };
-    let recording = Recording::open(&[path.to_owned()]).map_err(at)?;
-    attached(&recording, name).map_err(at)
+pub fn attached_texts<const N: usize>(
+    results: &Path,
+    names: [&str; N],
+) -> Result<[Option<String>; N], StoredResultError> {
+    let path = run_file(results);
+    let at = |source| StoredResultError::Open { path: path.clone(), source: Box::new(source) };
+    let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
+    attached(&recording, names).map_err(at)
 }
 
 /// The same of one that is open.
-fn attached(recording: &Recording, name: &str) -> Result<Option<String>, RecordingError> {
-    let mut found = None;
+fn attached<const N: usize>(
+    recording: &Recording,
+    names: [&str; N],
+) -> Result<[Option<String>; N], RecordingError> {
+    let mut found = [const { None }; N];
     recording.for_each_attachment(&mut |a| {
-        if found.is_none() && a.name.strip_prefix(OWN) == Some(name) {
-            found = Some(String::from_utf8_lossy(a.data).into_owned());
+        for (text, name) in found.iter_mut().zip(names) {
+            if text.is_none() && a.name.strip_prefix(OWN) == Some(name) {
+                *text = Some(String::from_utf8_lossy(a.data).into_owned());
+            }
         }
         Ok(())
     })?;
@@ -209,7 +213,7 @@ impl StoredRun {
         if residuals.is_empty() {
             return Err(missing("/armcal/residuals"));
         }
-        let summary = attached(&recording, SUMMARY).map_err(at)?;
+        let [summary] = attached(&recording, [SUMMARY]).map_err(at)?;
         let inputs = recording.metadata().map_err(at)?;
         Ok(StoredRun {
             recordings: recordings(&inputs, &dwells),
