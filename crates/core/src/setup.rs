@@ -32,6 +32,9 @@ pub struct SetupFinding {
     pub after_mm: Option<f64>,
     /// Other changes that these data cannot tell from it.
     pub alternatives: Vec<String>,
+    /// Whether an effect that leaves less of the errors takes its place: it estimates numbers, and something remains.
+    #[serde(skip)]
+    pub gives_way: bool,
 }
 
 impl SetupFinding {
@@ -86,11 +89,17 @@ impl SetupReport {
         self.findings.iter().filter(|f| f.certainty == Certainty::Mistake)
     }
 
-    /// Drops changes that were only possible where something physical was named that leaves no more of the errors [mm] than
-    /// they would: a frame that is let go follows much that is no mistake of the setup.
+    /// Whether all that forbids physical names may give way to one that leaves less of the errors.
+    pub fn may_give_way(&self) -> bool {
+        self.mistakes().next().is_some() && self.mistakes().all(|f| f.gives_way)
+    }
+
+    /// Drops changes that were only possible, or give way, where something physical was named that leaves no more of the errors [mm]
+    /// than they would: frames and parameters that are let go follow much that is no mistake of the setup.
     pub fn outdone_by(&mut self, physics_mm: f64) {
         let better = |f: &SetupFinding| f.after_mm.is_none_or(|mm| mm < physics_mm);
-        self.findings.retain(|f| f.certainty == Certainty::Mistake || f.before_mm.is_none() || better(f));
+        let sure = |f: &SetupFinding| f.certainty == Certainty::Mistake && !f.gives_way;
+        self.findings.retain(|f| sure(f) || f.before_mm.is_none() || better(f));
     }
 
     /// Everything that was found, and what could not be, for every output.
@@ -114,6 +123,7 @@ mod tests {
             before_mm,
             after_mm,
             alternatives: Vec::new(),
+            gives_way: false,
         };
         let possible = finding(Certainty::Possible, Some(0.61), Some(0.19));
         let sure = finding(Certainty::Mistake, Some(0.61), Some(0.19));
@@ -126,6 +136,14 @@ mod tests {
             report.findings
         };
         assert_eq!(left(0.18), [sure.clone(), seen.clone()]);
-        assert_eq!(left(0.20), [sure, possible, seen], "the change leaves less than what was named");
+        assert_eq!(left(0.20), [sure.clone(), possible, seen], "the change leaves less than what was named");
+        let estimates = SetupFinding { gives_way: true, ..sure.clone() };
+        let with = |findings| SetupReport { findings, ..SetupReport::default() };
+        let (mut alone, beside) = (with(vec![estimates.clone()]), with(vec![estimates.clone(), sure]));
+        assert!(alone.may_give_way() && !beside.may_give_way() && !with(Vec::new()).may_give_way());
+        alone.outdone_by(0.20);
+        assert_eq!(alone.findings, [estimates]);
+        alone.outdone_by(0.18);
+        assert_eq!(alone.findings, []);
     }
 }

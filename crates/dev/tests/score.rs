@@ -119,6 +119,14 @@ fn recordings_on_disk_are_diagnosed_as_observations_are() {
     assert_eq!(count(&all, &["first", "rightly_silent"]), all.len());
 }
 
+/// The wrong ratio of a large joint drives four parameters onto their bounds: free to leave them they would take two thirds of the
+/// error, the ratio takes all of it.
+#[test]
+fn an_effect_that_leaves_less_takes_the_place_of_parameters_beyond_their_bounds() {
+    let all = scored(&["gear_ratio", "--seeds", "1", "--from", "181001", "--sealed"]);
+    assert_eq!((count(&all, &["first"]), at_floor(&all)), (1, 1), "{all:?}");
+}
+
 /// docs/confusion.md in small: the page says what was answered, scenario by scenario, and how to make it again.
 #[test]
 fn the_page_of_scores_says_what_was_answered() {

@@ -88,6 +88,9 @@ fn names_settled(
             ));
         }
         let fallen = settled_all.iter().any(Option::is_none);
+        let as_found = settled_all.iter().zip(&search.accepted);
+        let as_found: Vec<Accepted> =
+            as_found.filter_map(|(settled, found)| Some(settled.as_ref()?.told_as(found))).collect();
         search.accepted = settled_all.into_iter().flatten().collect();
         let alone = !fallen && search.accepted.len() < 2;
         if specs(&search.accepted) == before || alone || round == ROUNDS {
@@ -96,8 +99,29 @@ fn names_settled(
         // Beside another name one of them may be needed no longer.
         let steps = known(&named(&search.accepted), &search.rest);
         search.accepted = confirm(conditioned_problems, steps, &curves, config)?;
+        // Each may stand in the place of its name, and all of them not beside each other.
+        let mut says = |names: &[Accepted]| {
+            conditioned_problems.score(&[named(names), curves.clone()].concat(), &search.rest)
+        };
+        if let (Some(found), Some(confirmed)) = (says(&as_found), says(&search.accepted))
+            && found.above(&confirmed).is_clear(config.margin_nats)
+        {
+            search.accepted = as_found;
+            break;
+        }
     }
     Ok(())
+}
+
+impl Accepted {
+    /// The same with the name that was found first, where the answer holds it.
+    fn told_as(&self, found: &Accepted) -> Accepted {
+        let Some(at) = self.set.iter().position(|k| *k == found.judged.entry) else { return self.clone() };
+        let mut set = self.set.clone();
+        set[..=at].rotate_right(1);
+        let Accepted { candidate, judged, grade, .. } = found.clone();
+        Accepted { candidate, judged, grade, set, ..self.clone() }
+    }
 }
 
 fn specs(accepted: &[Accepted]) -> Vec<String> {
@@ -199,13 +223,23 @@ fn answer(
     let best = refits.iter().map(|(_, score)| score.above(nothing).nats).fold(0.0, f64::max);
     let detail = config.leftover_share * best;
     let costs = conditioned.costs(config);
+    let worth = |k: usize, score: &Score| score.worth(costs.of_entry(k));
+    let own = refits.iter().find(|(k, _)| *k == found.judged.entry).map(|(k, score)| worth(*k, score));
+    let real = |k: usize, score: &Score| {
+        let mut judged = conditioned.judge(k, config);
+        // What is worth more than a name that is no chance is none either, though one step may say so.
+        if own.is_none_or(|own| worth(k, score) < own) {
+            return judged.grade(config) > Grade::Refused;
+        }
+        judged.refitted(score.clone(), nothing);
+        k == found.judged.entry || !judged.is_refuted(config)
+    };
     let stands = |(k, score): &&(usize, Score)| {
         // What has more freedom must say more by what that costs, too.
         let freedom = |other: usize| (costs.of_entry(other) - costs.of_entry(*k)).max(0.0);
         let beats = |(l, other): &(usize, Score)| other.above(score).less(freedom(*l)).is_clear(detail);
         let beaten = refits.iter().any(beats);
-        let real = *k == found.judged.entry || conditioned.judge(*k, config).grade(config) > Grade::Refused;
-        !beaten && real && score.above(nothing).nats >= config.margin_nats
+        !beaten && real(*k, score) && score.above(nothing).nats >= config.margin_nats
     };
     let set = simplest_first(refits.iter().filter(stands).collect(), costs);
     let (acts, others): (Vec<usize>, Vec<usize>) = set.iter().partition(|k| of(**k).known.is_some());

@@ -76,9 +76,27 @@ pub fn settle_again(
     let concluded = concluded.filter(|earlier| earlier.are_of(&grounds));
     let setup = match &concluded {
         Some(earlier) => earlier.setup.clone(),
-        None => setup::examine(&inputs, &fitted),
+        None => examined(pipeline, &inputs, &fitted, progress),
     };
     Ok(Converged { recordings, model_texts, inputs, setup, fitted, concluded })
+}
+
+/// What contradicts the data about the setup, and leaves less of the errors than any effect that has a name.
+fn examined(pipeline: &Pipeline, inputs: &Inputs, fitted: &Fitted, progress: &dyn Steps) -> SetupReport {
+    let mut setup = setup::examine(inputs, fitted);
+    if setup.may_give_way()
+        && let Ok(physics) = diagnosis(pipeline, &fitted.calibrated(pipeline), progress)
+    {
+        give_way(&mut setup, physics.as_ref());
+    }
+    setup
+}
+
+/// Drops what an effect explains better, where it has one name.
+fn give_way(setup: &mut SetupReport, physics: Option<&Diagnosis>) {
+    if let Some(named) = physics.filter(|d| d.verdict == Verdict::Identified) {
+        setup.outdone_by(named.holdout_mm.after);
+    }
 }
 
 /// Tells which round begins.
@@ -150,9 +168,7 @@ impl Converged {
         let found = self.diagnose(pipeline, progress);
         let (mut run, recordings) = self.into_run(pipeline);
         set_diagnosis(&mut run, found);
-        if let Some(named) = run.diagnosis.as_ref().filter(|d| d.verdict == Verdict::Identified) {
-            run.setup.outdone_by(named.holdout_mm.after);
-        }
+        give_way(&mut run.setup, run.diagnosis.as_ref());
         (run, recordings)
     }
 

@@ -55,5 +55,6 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
         before_mm: Some(before_m * 1e3),
         after_mm: Some(after_m * 1e3),
         alternatives: Vec::new(),
+        gives_way: false,
     })
 }

@@ -4,7 +4,7 @@ use super::beyond;
 use super::hypotheses::{Estimated, Hypothesis};
 use super::spread::spread_m;
 use super::trial::Misfit;
-use super::weigh::SAME_FACTOR;
+use super::weigh::{SAME_FACTOR, in_doubt};
 use armcal_calibrate::Calibration;
 use armcal_core::units::millimetres;
 use armcal_core::{Certainty, SetupFinding};
@@ -93,6 +93,7 @@ pub fn finding(
         before_mm: before.fitted.map(|_| before.mean_m() * 1e3),
         after_mm: Some(after.mean_m() * 1e3),
         alternatives: alternatives.to_vec(),
+        gives_way: h.of_the_model() && in_doubt(&after.trial),
     }
 }
 

@@ -15,9 +15,6 @@ use armcal_stages::{Fitted, Inputs};
 const MOST_MISTAKES: usize = 3;
 /// What makes the errors of the nominal arm this many times as large undoes no mistake.
 const HOPELESS: f64 = 2.0;
-/// Codes of changes that let the model's own parameters go.
-const OF_THE_MODEL: [&str; 3] = ["parameter-bound", "parameter-fixed", "joint-zero"];
-
 /// A mistake that was found, and the changes that these data cannot tell from it.
 type Found = (Hypothesis, Vec<String>);
 
@@ -142,8 +139,7 @@ fn explaining(
     let (mut far, mut within) = (Vec::new(), Vec::new());
     for t in tried {
         let explains = explains(before, &t.misfit) && far_enough(before, t.hypothesis.freedom, &t.misfit);
-        let own = OF_THE_MODEL.contains(&t.hypothesis.code) && !t.hypothesis.estimated.is_empty();
-        let perhaps = own && at_the_floor(before, &t.misfit);
+        let perhaps = t.hypothesis.of_the_model() && at_the_floor(before, &t.misfit);
         if !(explains || perhaps) {
             continue;
         }

@@ -92,11 +92,35 @@ pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), ScoreError> 
     let place = seal(scenario, open.path(), &closed.path().join("truth.json"))?;
     let pipeline = Pipeline::load(&place.pipeline)?;
     let settled = armcal_pipeline::settle(&pipeline, &Silent)?;
+    if let Some(mistake) = settled.setup.mistakes().next() {
+        let told = accused(&mistake.code, &settled.fitted.calibration);
+        return Ok((told, truth(&place.truth)?.hidden));
+    }
     let begin = std::time::Instant::now();
     let diagnosis = settled.diagnose(&pipeline, &Silent)?.ok_or(ScoreError::NotDiagnosed)?;
     let seconds = begin.elapsed().as_secs_f64();
     let of_geometry = Calibrated { model: &settled.fitted.geometry, ..settled.fitted.calibrated(&pipeline) };
     Ok((Answer { seconds, ..answer(&diagnosis, &of_geometry)? }, truth(&place.truth)?.hidden))
+}
+
+/// A mistake of the setup that nobody made is a name, and wrong.
+fn accused(code: &str, calibration: &Calibration) -> Answer {
+    let held_out_mm = calibration.judged().fitted.mean_m * 1e3;
+    Answer {
+        verdict: Verdict::Identified,
+        names: vec![format!("setup: {code}")],
+        probability: None,
+        sets: vec![vec![format!("setup: {code}")]],
+        set_probabilities: Vec::new(),
+        unknown: None,
+        suggested: Vec::new(),
+        before_mm: held_out_mm,
+        after_mm: held_out_mm,
+        floor_mm: calibration.noise_floor_m * 1e3,
+        dwells: calibration.residuals.len(),
+        seconds: 0.0,
+        calibration_seconds: 0.0,
+    }
 }
 
 fn truth(path: &Path) -> Result<Truth, ScoreError> {

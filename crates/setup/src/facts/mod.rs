@@ -155,6 +155,7 @@ fn mistake(code: &'static str, subject: String, message: String) -> SetupFinding
         before_mm: None,
         after_mm: None,
         alternatives: Vec::new(),
+        gives_way: false,
     }
 }
 

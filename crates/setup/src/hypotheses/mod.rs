@@ -136,6 +136,12 @@ impl Hypothesis {
         Hypothesis { freedom, estimated, ..self }
     }
 
+    /// Whether it lets the model's own parameters go.
+    pub fn of_the_model(&self) -> bool {
+        !self.estimated.is_empty()
+            && ["parameter-bound", "parameter-fixed", "joint-zero"].contains(&self.code)
+    }
+
     /// The inputs without the mistake.
     pub fn undone(&self, inputs: &Inputs) -> Inputs {
         let mut changed = inputs.clone();
