@@ -23,6 +23,8 @@ const SLACK_NATS: f64 = 10.0;
 const REACH_SHARE: f64 = 0.25;
 /// Moments, and shapes, of one cause that are scored.
 const MOMENTS: usize = 2;
+/// What is not listed is told beside a name from this probability on.
+const DOUBT: f64 = 0.1;
 /// Rounds in which names that change their places are confirmed again.
 const ROUNDS: usize = 3;
 
@@ -162,7 +164,10 @@ fn settled(
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
     let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &conditioned, config);
     let candidate = conditioned.weighed.entries[judged.entry].candidate.clone();
-    let settled = Accepted { candidate, judged, conditioned, grade, set, instead_of, ranked };
+    let mut settled = Accepted { candidate, judged, conditioned, grade, set, instead_of, ranked };
+    if settled.probability(|what| what == Instead::Unlisted) > DOUBT {
+        settled.grade = settled.grade.min(Grade::OrUnlisted);
+    }
     (settled.probability(|what| what == Instead::Nothing) <= 0.5).then_some(settled)
 }
 
