@@ -275,6 +275,19 @@ fn a_name_falls_where_its_refit_says_no_more_than_nothing() {
     );
 }
 
+#[test]
+fn what_is_not_listed_is_told_beside_a_name_from_a_tenth_of_the_probability_on() {
+    let mut doubted = [0, 0];
+    for more in -60..60 {
+        let unlisted = [35.0, 15.0, 35.0, 15.0].map(|nats| nats + 0.25 * f64::from(more));
+        let Some(settled) = settled_where([25.0, 25.1, 25.0, 25.1], unlisted, 0.1) else { break };
+        let doubt = settled.probability(|what| what == Instead::Unlisted) > 0.1;
+        assert_eq!(settled.grade == Grade::OrUnlisted, doubt, "{more}");
+        doubted[usize::from(doubt)] += 1;
+    }
+    assert!(doubted.iter().all(|n| *n > 0), "{doubted:?}");
+}
+
 /// The specs that [`answer`] tells where refits of these say so many nats a group more than nothing, in groups that hardly differ;
 /// and those that the user's knowledge leaves out. The name that was found is `backlash:1`.
 fn answered(p: &Problem, said: &[(&str, f64)], acts: &[&str]) -> (Vec<String>, Vec<String>) {
