@@ -206,37 +206,14 @@ pub(crate) fn forward(
             }
             Err(error) => return Err(error),
         };
-        let weighed = &conditioned.weighed;
-        if weighed.p_nothing >= config.max_probability_nothing {
+        if conditioned.weighed.p_nothing >= config.max_probability_nothing {
             break;
         }
-        let Some((top, _)) = leading(&conditioned, config).into_iter().next() else { break };
-        let mut judged = conditioned.judge(top, config);
-        let mut named = judged.grade(config) == Grade::Named;
-        let entry = &weighed.entries[judged.entry];
-        // Far from the fit one step is short, and an unlisted shape has more of them.
-        if !named
-            && let Some(score) = conditioned_problems
-                .score(&[accepted.clone(), vec![entry.candidate.clone()]].concat(), &conditioned)
-        {
-            judged.refitted(score, conditioned.nothing());
-            named = judged.grade(config) == Grade::Named;
-        }
-        // Before an unlisted shape beats it, it may show what it does at its own size.
-        if !named
-            && entry.ln_evidence >= config.margin_nats
-            && conditioned_problems.refine(&accepted, &entry.candidate)?
-        {
-            continue;
-        }
-        if !judged.promising(config) {
-            break;
-        }
-        let fall = judged.own().score * weighed.scale.powi(2);
-        let gain_nats = judged.gain.nats;
-        let unlisted_nats = judged.unlisted.as_ref().map_or(0.0, |u| gain_nats + u.above.nats);
-        let candidate = entry.candidate.clone();
-        let step = Step { candidate, named_at_once: named, gain_nats, unlisted_nats, fall };
+        let step = match next_step(conditioned_problems, &conditioned, &accepted, config)? {
+            Next::Step(step) => step,
+            Next::Again => continue,
+            Next::End => break,
+        };
         if steps.iter().any(|earlier| step.may_be_detail_of(earlier, config)) {
             may_be_shape = true;
             break;
@@ -255,6 +232,56 @@ pub(crate) fn forward(
         }
     }
     Ok((steps, may_be_shape))
+}
+
+/// What comes after the steps so far.
+enum Next {
+    /// This one.
+    Step(Step),
+    /// The same question again: the leader was put at its own size.
+    Again,
+    /// Nothing that is worth trying.
+    End,
+}
+
+/// The leader of what these accepted ones leave, if it is promising.
+fn next_step(
+    conditioned_problems: &mut ConditionedProblems<'_>,
+    conditioned: &ConditionedProblem,
+    accepted: &[Candidate],
+    config: &DiagnosisConfig,
+) -> Result<Next, DiagnoseError> {
+    let weighed = &conditioned.weighed;
+    let Some((top, _)) = leading(conditioned, config).into_iter().next() else { return Ok(Next::End) };
+    let mut judged = conditioned.judge(top, config);
+    let mut named = judged.grade(config) == Grade::Named;
+    let entry = &weighed.entries[judged.entry];
+    // Far from the fit one step is short, and an unlisted shape has more of them.
+    if !named
+        && let Some(score) = conditioned_problems
+            .score(&[accepted, std::slice::from_ref(&entry.candidate)].concat(), conditioned)
+    {
+        judged.refitted(score, conditioned.nothing());
+        named = judged.grade(config) == Grade::Named;
+    }
+    // Before an unlisted shape beats it, it may show what it does at its own size.
+    if !named
+        && entry.ln_evidence >= config.margin_nats
+        && conditioned_problems.refine(accepted, &entry.candidate)?
+    {
+        return Ok(Next::Again);
+    }
+    if !judged.promising(config) {
+        return Ok(Next::End);
+    }
+    let gain_nats = judged.gain.nats;
+    Ok(Next::Step(Step {
+        candidate: entry.candidate.clone(),
+        named_at_once: named,
+        gain_nats,
+        unlisted_nats: judged.unlisted.as_ref().map_or(0.0, |u| gain_nats + u.above.nats),
+        fall: judged.own().score * weighed.scale.powi(2),
+    }))
 }
 
 /// Whether the last steps had no name at once, and all together say no more than an unlisted shape.
