@@ -139,10 +139,7 @@ pub(crate) fn confirm(
                 ranked: Vec::new(),
             });
         }
-        // What is no more than the detail of another one's shape is no effect.
-        let most = judged.iter().map(|a| a.judged.gain.nats).fold(0.0, f64::max);
-        let detail = judged.iter().position(|a| a.judged.gain.nats < config.leftover_share * most);
-        match gone.or_else(|| weakest(&judged)).or(detail) {
+        match gone.or_else(|| weakest(&judged)).or_else(|| detail(&judged, config)) {
             Some(k) => drop(steps.remove(k)),
             None => return Ok(judged),
         }
@@ -154,6 +151,12 @@ fn weakest(judged: &[Accepted]) -> Option<usize> {
     let refused = judged.iter().enumerate().filter(|(_, a)| a.grade == Grade::Refused);
     let least = refused.min_by(|a, b| a.1.judged.gain.nats.total_cmp(&b.1.judged.gain.nats));
     least.map(|(k, _)| k)
+}
+
+/// What is no more than the detail of another one's shape: it is no effect.
+fn detail(judged: &[Accepted], config: &DiagnosisConfig) -> Option<usize> {
+    let most = judged.iter().map(|a| a.judged.gain.nats).fold(0.0, f64::max);
+    judged.iter().position(|a| a.judged.gain.nats < config.leftover_share * most)
 }
 
 /// The entry of a candidate; a scan may have moved to another shape, or an event to a dwell nearby.

@@ -57,31 +57,55 @@ fn four_steps_without_a_name_end_the_search_where_they_say_no_more_than_an_unlis
     assert!(!ends(99.0, [true, false, false, false]) && !ends(99.0, [false, false, false, true]));
 }
 
-#[test]
-fn of_what_is_refused_that_leaves_which_says_least() {
+/// A planted play judged alone, as often as asked, with these grades and gains; and what is asked of all.
+fn of_judged<T>(all: &[(Grade, f64)], ask: impl Fn(&[Accepted]) -> T) -> T {
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     let conditioned = conditioned(&p, &quick());
     let verdict = conditioned.judge(entry(&conditioned.weighed, "backlash:1"), &quick());
-    let with = |(grade, nats): (Grade, f64)| {
+    let with = |(grade, nats): &(Grade, f64)| {
         let mut judged = verdict.clone();
-        judged.gain.nats = nats;
+        judged.gain.nats = *nats;
         Accepted {
             candidate: own(&p, "backlash:1"),
             judged,
             conditioned: conditioned.clone(),
-            grade,
+            grade: *grade,
             set: vec![0],
             instead_of: Vec::new(),
             ranked: Vec::new(),
         }
     };
-    let of = |all: &[(Grade, f64)]| weakest(&all.iter().copied().map(with).collect::<Vec<_>>());
+    ask(&all.iter().map(with).collect::<Vec<_>>())
+}
+
+#[test]
+fn of_what_is_refused_that_leaves_which_says_least() {
     use Grade::{Named, OrUnlisted, Refused};
-    assert_eq!(
-        of(&[(Named, -5.0), (Refused, 9.0), (Refused, 7.0), (OrUnlisted, 1.0), (Refused, 8.0)]),
-        Some(2)
-    );
-    assert_eq!(of(&[(Named, -5.0), (OrUnlisted, 1.0)]), None);
+    let refused = [(Named, -5.0), (Refused, 9.0), (Refused, 7.0), (OrUnlisted, 1.0), (Refused, 8.0)];
+    assert_eq!(of_judged(&refused, weakest), Some(2));
+    assert_eq!(of_judged(&[(Named, -5.0), (OrUnlisted, 1.0)], weakest), None);
+}
+
+#[test]
+fn what_says_less_than_a_hundredth_of_another_one_is_a_detail_of_it() {
+    let of = |nats: &[f64]| {
+        let all: Vec<(Grade, f64)> = nats.iter().map(|n| (Grade::Named, *n)).collect();
+        of_judged(&all, |judged| detail(judged, &quick()))
+    };
+    assert_eq!(of(&[20.0, 1000.0, 9.9, 3.0]), Some(2));
+    assert_eq!(of(&[20.0, 1000.0, 10.0]), None);
+    assert_eq!(of(&[]), None);
+}
+
+#[test]
+fn the_fall_by_a_name_is_of_the_declared_noise() {
+    let ratio = of_judged(&[(Grade::Named, 1.0)], |judged| {
+        let mut conditioned = (*judged[0].conditioned).clone();
+        conditioned.weighed.scale *= 3.0;
+        let scaled = Accepted { conditioned: Rc::new(conditioned), ..judged[0].clone() };
+        scaled.fall() / judged[0].fall()
+    });
+    assert!((ratio - 9.0).abs() < 1e-9, "the same fall of noise three times as large: {ratio}");
 }
 
 #[test]
