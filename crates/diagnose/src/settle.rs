@@ -122,7 +122,15 @@ impl Accepted {
         let mut set = self.set.clone();
         set[..=at].rotate_right(1);
         let Accepted { candidate, judged, grade, .. } = found.clone();
-        Accepted { candidate, judged, grade, set, ..self.clone() }
+        Accepted { candidate, judged, grade, set, ..self.clone() }.doubted()
+    }
+
+    /// What is not listed beside it, where that is not improbable.
+    fn doubted(mut self) -> Accepted {
+        if self.probability(|what| what == Instead::Unlisted) > DOUBT {
+            self.grade = self.grade.min(Grade::OrUnlisted);
+        }
+        self
     }
 }
 
@@ -164,10 +172,7 @@ fn settled(
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
     let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &conditioned, config);
     let candidate = conditioned.weighed.entries[judged.entry].candidate.clone();
-    let mut settled = Accepted { candidate, judged, conditioned, grade, set, instead_of, ranked };
-    if settled.probability(|what| what == Instead::Unlisted) > DOUBT {
-        settled.grade = settled.grade.min(Grade::OrUnlisted);
-    }
+    let settled = Accepted { candidate, judged, conditioned, grade, set, instead_of, ranked }.doubted();
     (settled.probability(|what| what == Instead::Nothing) <= 0.5).then_some(settled)
 }
 
