@@ -87,8 +87,14 @@ fn most_of(calibrated: &Calibrated<'_>, found: &Refitted, values: &[f64]) -> Opt
             *sum = [sum[0] + along, sum[1] + 0.5 * (all - along), sum[2] + 1.0];
         }
     }
+    least_probable(&sums)
+}
+
+/// The joint whose ratio of squared errors along it to those across it (half of their sum, they have two directions) is the least probable,
+/// and how probable that is.
+fn least_probable(along_across_n: &[[f64; 3]]) -> Option<(usize, f64)> {
     let p = |[along, across, n]: &[f64; 3]| ln_f_tail(along / across.max(1e-300), *n, 2.0 * n);
-    let by_joint = sums.iter().map(p).enumerate().filter(|(_, ln_p)| ln_p.is_finite());
+    let by_joint = along_across_n.iter().map(p).enumerate().filter(|(_, ln_p)| ln_p.is_finite());
     by_joint.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(joint, ln_p)| (joint, ln_p.exp()))
 }
 

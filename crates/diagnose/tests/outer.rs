@@ -375,6 +375,23 @@ fn scatter_that_is_wider_than_the_play_is_not_the_play() {
     assert!(d.unexplained.is_some(), "{:?}", d.verdict);
 }
 
+#[test]
+fn errors_alike_in_every_direction_are_no_rest_in_a_play() {
+    for seed in [1, 2] {
+        let (model, mut observations) = observed(&["backlash:1"], 1.0, seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        for o in &mut observations {
+            let off = Vector3::from_fn(|_, _| 3.0 * SIGMA_M * rng.sample::<f64, _>(StandardNormal));
+            if let Reference::Tracked { position_m, .. } = &mut o.reference {
+                *position_m += off;
+            }
+        }
+        let d = diagnosed(&model, &calibration(&model, &observations), &observations);
+        assert!(d.names.iter().any(|name| name == "backlash:1"), "{:?}", d.names);
+        assert!(d.warnings.iter().all(|w| w.code != "rests-in-play"), "{:?}", d.warnings);
+    }
+}
+
 /// Errors of the size and kind that no effect makes: each dwell off by itself, twenty times the noise.
 fn scattered(mut observations: Vec<Observation>, seed: u64) -> Vec<Observation> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
