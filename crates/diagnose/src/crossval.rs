@@ -149,7 +149,8 @@ fn without_by_hat(
     (DMatrix::identity(n, n) - half.tr_mul(&half)).cholesky().map(|c| c.solve(residual))
 }
 
-fn solve(upper: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+/// The solution of a symmetric system of which `upper` is the Cholesky factor; a singular one is left as it is.
+pub(crate) fn solve(upper: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     let half = upper.tr_solve_upper_triangular(right).unwrap_or_else(|| right.clone());
     upper.solve_upper_triangular(&half).unwrap_or(half)
 }

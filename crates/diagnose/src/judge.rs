@@ -5,7 +5,7 @@ use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
 use crate::confusion::{OneStep, Signature, half_width, one_step};
 use crate::contrasts::{Contrast, contrast};
-use crate::crossval::by_recording;
+use crate::crossval::{by_recording, solve};
 use crate::evidence::{best_amplitude, coefficients};
 use crate::places::units;
 use crate::problem::{Amplitude, Problem};
@@ -271,9 +271,7 @@ pub(crate) fn base_fit(problem: &Problem, products: &DMatrix<f64>, scale: f64) -
         normal[(k, k)] += precision;
         right[k] -= precision * problem.geometry_offset[k];
     }
-    let factor = crate::projection::cholesky_upper(normal);
-    let half = factor.tr_solve_upper_triangular(&right).unwrap_or_else(|| right.clone());
-    factor.solve_upper_triangular(&half).unwrap_or(half)
+    solve(&crate::projection::cholesky_upper(normal), &right)
 }
 
 #[cfg(test)]
