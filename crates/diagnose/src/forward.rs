@@ -213,7 +213,7 @@ pub(crate) fn forward(
             break;
         }
         let step = match next_step(conditioned_problems, &conditioned, &accepted, config)? {
-            Next::Step(step) => step,
+            Next::Step(step) => *step,
             Next::Again => continue,
             Next::End => break,
         };
@@ -240,7 +240,7 @@ pub(crate) fn forward(
 /// What comes after the steps so far.
 enum Next {
     /// This one.
-    Step(Step),
+    Step(Box<Step>),
     /// The same question again: the leader was put at its own size.
     Again,
     /// Nothing that is worth trying.
@@ -278,13 +278,13 @@ fn next_step(
         return Ok(Next::End);
     }
     let gain_nats = judged.gain.nats;
-    Ok(Next::Step(Step {
+    Ok(Next::Step(Box::new(Step {
         candidate: entry.candidate.clone(),
         named_at_once: named,
         gain_nats,
         unlisted_nats: judged.unlisted.as_ref().map_or(0.0, |u| gain_nats + u.above.nats),
         fall: judged.own().score * weighed.scale.powi(2),
-    }))
+    })))
 }
 
 /// Whether the last steps had no name at once, and all together say no more than an unlisted shape.
