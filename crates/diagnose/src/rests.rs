@@ -84,10 +84,15 @@ fn most_of(calibrated: &Calibrated<'_>, found: &Refitted, values: &[f64]) -> Opt
         for (sum, of) in sums.iter_mut().zip(implied_joint_errors(model, values, o, &r.fitted_m)) {
             let Some(ImpliedError { error, sigma }) = of else { continue };
             let along = (error / sigma).powi(2);
-            *sum = [sum[0] + along, sum[1] + 0.5 * (all - along), sum[2] + 1.0];
+            *sum = with(*sum, along, all);
         }
     }
     least_probable(&sums)
+}
+
+/// The sums with one dwell more: its squared error along a joint of all of it, and half of the rest.
+fn with([along, across, n]: [f64; 3], own: f64, all: f64) -> [f64; 3] {
+    [along + own, across + 0.5 * (all - own), n + 1.0]
 }
 
 /// The joint whose ratio of squared errors along it to those across it (half of their sum, they have two directions) is the least probable,

@@ -281,15 +281,14 @@ fn the_refit_gives_the_numbers_of_the_verdict() {
 
 /// An arm whose joint 1 rests anywhere in two fifths of its play, on its way back from the flank that pushed it.
 fn resting(seed: u64) -> (Model, Vec<Observation>) {
-    resting_beside(&[], seed)
+    resting_in(0, &["backlash:1"], seed)
 }
 
-/// The same with plays of as much in other joints, which are always on a flank.
-fn resting_beside(others: &[&str], seed: u64) -> (Model, Vec<Observation>) {
+/// A joint that rests in its play, which is one of several; the others are always on a flank.
+fn resting_in(joint: usize, plays: &[&str], seed: u64) -> (Model, Vec<Observation>) {
     let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
     let (model, mut observations) = observed(&[], 0.0, seed);
-    let plays: Vec<EffectSpec> =
-        ["backlash:1"].iter().chain(others).map(|name| model.effect(name).unwrap()).collect();
+    let plays: Vec<EffectSpec> = plays.iter().map(|name| model.effect(name).unwrap()).collect();
     let truth = model.with_effects(&plays, &Session::of(&observations)).unwrap();
     let mut p = truth.nominal();
     for (k, parameter) in truth.parameters().iter().enumerate().skip(model.parameters().len()) {
@@ -297,7 +296,7 @@ fn resting_beside(others: &[&str], seed: u64) -> (Model, Vec<Observation>) {
     }
     for o in &mut observations {
         let mut rested = o.clone();
-        rested.joint_rad[0] += o.arrival[0].sign() * WIDTH_RAD * rng.random_range(0.0..0.4);
+        rested.joint_rad[joint] += o.arrival[joint].sign() * WIDTH_RAD * rng.random_range(0.0..0.4);
         let noise = Vector3::from_fn(|_, _| SIGMA_M * rng.sample::<f64, _>(StandardNormal));
         o.reference = Reference::position(truth.predicted_tip_in_world(&p, &rested) + noise);
     }
@@ -348,11 +347,12 @@ fn the_first_row_is_the_answer_of_a_joint_that_rests_in_its_play_too() {
 
 #[test]
 fn of_two_plays_the_one_rests_whose_joint_scatters() {
-    for seed in [1, 2] {
-        let (model, observations) = resting_beside(&["backlash:2"], seed);
+    for (joint, seed) in [(0, 1), (0, 2), (1, 1), (1, 2)] {
+        let (model, observations) = resting_in(joint, &["backlash:1", "backlash:2"], seed);
         let names = diagnosed(&model, &calibration(&model, &observations), &observations).names;
-        assert!(names.iter().any(|name| name.starts_with("backlash:1,rest=")), "{names:?}");
-        assert!(names.iter().any(|name| name == "backlash:2"), "{names:?}");
+        let [rests, other] = [joint, 1 - joint].map(|joint| format!("backlash:{}", joint + 1));
+        assert!(names.iter().any(|name| name.starts_with(&format!("{rests},rest="))), "{names:?}");
+        assert!(names.contains(&other), "{names:?}");
     }
 }
 

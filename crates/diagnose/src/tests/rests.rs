@@ -26,3 +26,8 @@ fn the_least_probable_ratio_is_that_of_the_f_distribution() {
     }
     assert_eq!(least_probable(&[]), None);
 }
+
+#[test]
+fn what_is_not_along_a_joint_lies_in_two_directions_across_it() {
+    assert_eq!(with([1.0, 2.0, 3.0], 4.0, 10.0), [5.0, 5.0, 4.0]);
+}
