@@ -79,50 +79,44 @@ fn names_settled(
         all.filter_map(|(i, a)| settled(a, &beside(&search.tentative, i), conditioned_problems, config));
     search.tentative = tentative.collect();
     for round in 1..=ROUNDS {
-        let before = specs(&search.accepted);
-        let mut settled_all = Vec::new();
-        for i in 0..search.accepted.len() {
-            settled_all.push(settled(
-                &search.accepted[i],
-                &beside(&search.accepted, i),
-                conditioned_problems,
-                config,
-            ));
-        }
-        let fallen = settled_all.iter().any(Option::is_none);
-        let as_found = settled_all.iter().zip(&search.accepted);
-        let as_found: Vec<Accepted> =
-            as_found.filter_map(|(settled, found)| Some(settled.as_ref()?.told_as(found))).collect();
-        search.accepted = settled_all.into_iter().flatten().collect();
-        let alone = !fallen && search.accepted.len() < 2;
+        let found = std::mem::take(&mut search.accepted);
+        let before = specs(&found);
+        let mut in_place = |i: usize| settled(&found[i], &beside(&found, i), conditioned_problems, config);
+        let settled_all: Vec<Option<Accepted>> = (0..found.len()).map(&mut in_place).collect();
+        let standing = found.into_iter().zip(settled_all).filter_map(|(found, own)| Some((found, own?)));
+        let (found, settled_all): (Vec<Accepted>, Vec<Accepted>) = standing.unzip();
+        search.accepted = settled_all;
+        let alone = found.len() == before.len() && found.len() < 2;
         if specs(&search.accepted) == before || alone || round == ROUNDS {
             break;
         }
         // Beside another name one of them may be needed no longer.
         let steps = known(&named(&search.accepted), &search.rest);
-        search.accepted = confirm(conditioned_problems, steps, &curves, config)?;
+        let confirmed = confirm(conditioned_problems, steps, &curves, config)?;
         // Each may stand in the place of its name, and all of them not beside each other.
+        let found: Vec<Accepted> =
+            search.accepted.drain(..).zip(&found).map(|(own, found)| own.told_as(found)).collect();
         let mut says = |names: &[Accepted]| {
             conditioned_problems.score(&[named(names), curves.clone()].concat(), &search.rest)
         };
-        if let (Some(found), Some(confirmed)) = (says(&as_found), says(&search.accepted))
-            && found.above(&confirmed).is_clear(config.margin_nats)
+        if let (Some(as_found), Some(as_confirmed)) = (says(&found), says(&confirmed))
+            && as_found.above(&as_confirmed).is_clear(config.margin_nats)
         {
-            search.accepted = as_found;
+            search.accepted = found;
             break;
         }
+        search.accepted = confirmed;
     }
     Ok(())
 }
 
 impl Accepted {
     /// The same with the name that was found first, where the answer holds it.
-    fn told_as(&self, found: &Accepted) -> Accepted {
-        let Some(at) = self.set.iter().position(|k| *k == found.judged.entry) else { return self.clone() };
-        let mut set = self.set.clone();
-        set[..=at].rotate_right(1);
-        let Accepted { candidate, judged, grade, .. } = found.clone();
-        Accepted { candidate, judged, grade, set, ..self.clone() }.doubted()
+    fn told_as(mut self, found: &Accepted) -> Accepted {
+        let Some(at) = self.set.iter().position(|k| *k == found.judged.entry) else { return self };
+        self.set[..=at].rotate_right(1);
+        let (candidate, judged) = (found.candidate.clone(), found.judged.clone());
+        Accepted { candidate, judged, grade: found.grade, ..self }.doubted()
     }
 
     /// What is not listed beside it, where that is not improbable.

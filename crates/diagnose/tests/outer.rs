@@ -378,25 +378,19 @@ fn scatter_that_is_wider_than_the_play_is_not_the_play() {
 #[test]
 fn errors_alike_in_every_direction_are_no_rest_in_a_play() {
     for seed in [1, 2] {
-        let (model, mut observations) = observed(&["backlash:1"], 1.0, seed);
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        for o in &mut observations {
-            let off = Vector3::from_fn(|_, _| 3.0 * SIGMA_M * rng.sample::<f64, _>(StandardNormal));
-            if let Reference::Tracked { position_m, .. } = &mut o.reference {
-                *position_m += off;
-            }
-        }
+        let (model, observations) = observed(&["backlash:1"], 1.0, seed);
+        let observations = scattered(observations, 3.0, seed);
         let d = diagnosed(&model, &calibration(&model, &observations), &observations);
         assert!(d.names.iter().any(|name| name == "backlash:1"), "{:?}", d.names);
         assert!(d.warnings.iter().all(|w| w.code != "rests-in-play"), "{:?}", d.warnings);
     }
 }
 
-/// Errors of the size and kind that no effect makes: each dwell off by itself, twenty times the noise.
-fn scattered(mut observations: Vec<Observation>, seed: u64) -> Vec<Observation> {
+/// Errors of a kind that no effect makes: each dwell off by itself, so many times the noise.
+fn scattered(mut observations: Vec<Observation>, times: f64, seed: u64) -> Vec<Observation> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for o in &mut observations {
-        let off = Vector3::from_fn(|_, _| 20.0 * SIGMA_M * rng.sample::<f64, _>(StandardNormal));
+        let off = Vector3::from_fn(|_, _| times * SIGMA_M * rng.sample::<f64, _>(StandardNormal));
         if let Reference::Tracked { position_m, .. } = &mut o.reference {
             *position_m += off;
         }
@@ -408,7 +402,7 @@ fn scattered(mut observations: Vec<Observation>, seed: u64) -> Vec<Observation> 
 fn errors_above_the_floor_without_an_explanation_are_unexplained() {
     for seed in 0..4 {
         let (model, observations) = observed(&[], 0.0, 2);
-        let observations = scattered(observations, seed);
+        let observations = scattered(observations, 20.0, seed);
         let before = calibration(&model, &observations);
         let d = diagnosed(&model, &before, &observations);
         assert_eq!(d.verdict, Verdict::Unexplained, "{:?}", d.names);
@@ -425,7 +419,7 @@ fn errors_above_the_floor_without_an_explanation_are_unexplained() {
 #[test]
 fn the_part_of_the_session_that_errs_is_named_as_the_place() {
     let (model, observations) = observed(&[], 0.0, 5);
-    let (scatter, half) = (scattered(observations.clone(), 7), observations.len());
+    let (scatter, half) = (scattered(observations.clone(), 20.0, 7), observations.len());
     let mixed: Vec<Observation> = observations
         .into_iter()
         .zip(scatter)
@@ -443,7 +437,7 @@ fn nothing_is_missing_only_at_the_floor_whatever_the_scatter() {
     // A law, over scatter from none to forty times the noise, in all dwells or in some.
     for seed in 0..12 {
         let (model, observations) = observed(&[], 0.0, 10 + seed);
-        let scatter = scattered(observations.clone(), seed);
+        let scatter = scattered(observations.clone(), 20.0, seed);
         let share = [1, 2, 5, 20][seed as usize % 4];
         let mixed: Vec<Observation> = observations
             .into_iter()

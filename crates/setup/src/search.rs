@@ -15,6 +15,7 @@ use armcal_stages::{Fitted, Inputs};
 const MOST_MISTAKES: usize = 3;
 /// What makes the errors of the nominal arm this many times as large undoes no mistake.
 const HOPELESS: f64 = 2.0;
+
 /// A mistake that was found, and the changes that these data cannot tell from it.
 type Found = (Hypothesis, Vec<String>);
 
