@@ -45,7 +45,7 @@ pub use dh_toml::DhRow;
 pub use effects::{
     Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, JointReference, Lookalikes, Offered,
     Override, PlacedEffect, Session, Shape, Since, Target, Toggle, Torque, catalogue, effects_toml, find,
-    is_of_effect, least_dwells, place_and_moment, tables_toml,
+    is_of_effect, least_dwells, place_and_moment, prelude as effect_prelude, register, tables_toml,
 };
 pub use error::ModelError;
 pub use fixed::{FixedPlace, Length};

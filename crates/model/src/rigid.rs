@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use num_dual::DualNum;
 
 /// The scalars the physics is written over.
-pub(crate) trait Scalar: DualNum<Primitive = f64> + Copy {}
+pub trait Scalar: DualNum<Primitive = f64> + Copy {}
 
 impl<D: DualNum<Primitive = f64> + Copy> Scalar for D {}
 

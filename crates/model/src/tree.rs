@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use std::borrow::Cow;
 
 /// A segment by its place in the tree.
-pub(crate) type SegmentId = usize;
+pub type SegmentId = usize;
 
 /// Segments, parents before their children, branch after branch.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -18,7 +18,7 @@ const UPRIGHT_COSINE: f64 = 0.999;
 const PARALLEL_COSINE: f64 = 0.99;
 
 /// The shape of a kind that acts on a whole arm: which one of several.
-pub(crate) const ARM: Shape = Shape {
+pub const ARM: Shape = Shape {
     name: "arm",
     unit: Unit::One,
     default: Some(1.0),
@@ -30,7 +30,7 @@ pub(crate) const ARM: Shape = Shape {
 };
 
 /// One spec about to be placed.
-pub(crate) struct EffectContext<'a> {
+pub struct EffectContext<'a> {
     /// The model it joins.
     pub model: &'a Model,
     /// The observations it will explain.
@@ -40,7 +40,7 @@ pub(crate) struct EffectContext<'a> {
     /// Its entry in the catalogue.
     pub kind: &'static EffectKind,
     /// The nominal arm with all joints at zero.
-    pub zero: &'a NominalPose,
+    pub(crate) zero: &'a NominalPose,
 }
 
 impl EffectContext<'_> {
@@ -228,7 +228,7 @@ impl EffectContext<'_> {
 }
 
 /// An amplitude: zero before the fit, free within `bound` around it.
-pub(crate) fn amplitude(
+pub fn amplitude(
     quantity: &str,
     unit: Unit,
     prior_sigma: f64,
@@ -245,13 +245,13 @@ pub(crate) fn amplitude(
 }
 
 /// An amplitude of an event: what it is told by is its usual size, and nothing keeps it from being many times that.
-pub(crate) fn of_event(amplitude: Parameter) -> Parameter {
+pub fn of_event(amplitude: Parameter) -> Parameter {
     let usual = amplitude.prior_sigma;
     Parameter { usual, prior_sigma: usual.map(|usual| EVENT_SIGMA * usual), ..amplitude }
 }
 
 /// Two amplitudes of a wave over a joint's angle [deg]; `angle` is what its sine and cosine are of.
-pub(crate) fn amplitudes_wave(typical_deg: f64, bound_deg: f64, angle: &str) -> Vec<Parameter> {
+pub fn amplitudes_wave(typical_deg: f64, bound_deg: f64, angle: &str) -> Vec<Parameter> {
     let of = |function: &str| {
         let meaning = format!("amplitude of {function}{angle}");
         amplitude(
@@ -273,17 +273,17 @@ const KNOCK: [f64; 2] = [1.2e-3, 0.12 * PI / 180.0];
 const REMOUNTED: [f64; 2] = [1.0, PI];
 
 /// The shift of an event along x, y, z.
-pub(crate) fn shift_xyz(meaning: &str) -> Vec<Parameter> {
+pub fn shift_xyz(meaning: &str) -> Vec<Parameter> {
     amplitudes_xyz("", Unit::Metre, KNOCK[0], REMOUNTED[0], meaning).into_iter().map(of_event).collect()
 }
 
 /// The turn of an event about x, y, z.
-pub(crate) fn turn_xyz(meaning: &str) -> Vec<Parameter> {
+pub fn turn_xyz(meaning: &str) -> Vec<Parameter> {
     amplitudes_xyz("r", Unit::Radian, KNOCK[1], REMOUNTED[1], meaning).into_iter().map(of_event).collect()
 }
 
 /// Three amplitudes along or about x, y, z.
-pub(crate) fn amplitudes_xyz(
+pub fn amplitudes_xyz(
     prefix: &str,
     unit: Unit,
     prior_sigma: f64,

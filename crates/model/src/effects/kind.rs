@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 /// One entry of the catalogue.
 pub struct EffectKind {
-    /// Its name in specs and files.
+    /// Its name in specs and files: letters, digits, underscores.
     pub name: &'static str,
     /// Other mechanisms that are the same to the data.
     pub aliases: &'static [&'static str],
@@ -37,14 +37,14 @@ pub struct EffectKind {
     /// Effects that it is the same as to every motion.
     pub lookalikes: &'static [Lookalikes],
     /// Its source file, whose header is its documentation.
-    pub(crate) source: &'static str,
+    pub source: &'static str,
     /// Puts it in its place, or says why it has none there.
-    pub(crate) place: fn(&EffectContext<'_>) -> Result<Placement, String>,
+    pub place: fn(&EffectContext<'_>) -> Result<Placement, String>,
 }
 
 impl EffectKind {
     /// What most entries have in common; each says the rest itself, and the contract tests ask for it.
-    pub(super) const PLAIN: EffectKind = EffectKind {
+    pub const PLAIN: EffectKind = EffectKind {
         name: "",
         aliases: &[],
         summary: "",
@@ -119,7 +119,7 @@ pub enum Family {
     Board,
     /// Clocks.
     Timing,
-    /// A formula of the user.
+    /// A formula of the user, in a pipeline.
     User,
 }
 
@@ -187,7 +187,7 @@ pub enum Offered {
 }
 
 /// The values of a shape worth trying, where it would be placed, for these observations.
-pub(crate) type Values = fn(&EffectContext<'_>, &[Observation]) -> Vec<f64>;
+pub type Values = fn(&EffectContext<'_>, &[Observation]) -> Vec<f64>;
 
 /// A number of an effect that is not an amplitude.
 #[derive(Debug, Clone, Copy)]
@@ -207,19 +207,19 @@ pub struct Shape {
     /// Whether it is a parameter (fixed unless freed); otherwise it names a part of the arm.
     pub parameter: bool,
     /// The values worth trying.
-    pub(crate) values: Option<Values>,
+    pub values: Option<Values>,
 }
 
 /// An effect in its place: its amplitudes and its physics.
-pub(crate) struct Placement {
+pub struct Placement {
     /// The amplitudes; their names are the quantities, without the spec.
-    pub amplitudes: Vec<Parameter>,
+    pub(crate) amplitudes: Vec<Parameter>,
     /// What they do.
-    pub physics: Arc<dyn AnyPhysics>,
+    pub(crate) physics: Arc<dyn AnyPhysics>,
     /// Where it twists the path.
-    pub slots: Vec<Slot>,
+    pub(crate) slots: Vec<Slot>,
     /// Whether it distorts what the sensor sees.
-    pub distorts: bool,
+    pub(crate) distorts: bool,
 }
 
 impl Placement {

@@ -3,7 +3,7 @@
 //! An effect is a [`Physics`](physics::Physics) in a file of its own, whose header is its documentation under
 //! fixed headings, and an [`EffectKind`] that says what it is called, where it can act and with which
 //! parameters. [`catalogue`] is the only registration: specs, files, help texts, the candidates of the diagnosis
-//! and the contract tests iterate it.
+//! and the contract tests iterate it. A program that embeds armcal adds kinds of its own with [`register`].
 //!
 //! The prediction with effects is `B A_1(q + dq, p + dp) ... A_n T`, with small twists between the segments where
 //! an effect bends or shifts something; what each effect adds to `dq`, `dp` and the twists depends only on its own
@@ -51,7 +51,7 @@ mod periodic;
 mod physics;
 mod placed;
 mod play;
-mod prelude;
+pub mod prelude;
 mod seat_offset;
 mod second_harmonic;
 mod sensor_scale;
@@ -85,6 +85,9 @@ pub use table::{EffectTable, JointReference, Override, effects_toml, tables_toml
 pub(crate) use declared::Declared;
 pub(crate) use nominal_pose::NominalPose;
 pub(crate) use placed::Effects;
+
+use crate::ModelError;
+use std::sync::OnceLock;
 
 /// The entries of the catalogue; each is called as its file, whose header is its documentation.
 macro_rules! catalogue {
@@ -138,12 +141,42 @@ static CATALOGUE: &[&EffectKind] = catalogue![
     expression,
 ];
 
+/// The catalogue of this process: ours, then what was registered before it was first read.
+static ALL: OnceLock<Vec<&'static EffectKind>> = OnceLock::new();
+
 /// Every kind of effect, in the order in which people read about them.
 pub fn catalogue() -> &'static [&'static EffectKind] {
-    CATALOGUE
+    ALL.get_or_init(|| CATALOGUE.to_vec())
 }
 
 /// A kind by its name.
 pub fn find(kind: &str) -> Option<&'static EffectKind> {
-    CATALOGUE.iter().copied().find(|entry| entry.name == kind)
+    catalogue().iter().copied().find(|entry| entry.name == kind)
+}
+
+/// Adds kinds of effects to the catalogue, after its own: once, before a model, a spec or a pipeline is read, so that one process
+/// has one catalogue.
+///
+/// # Errors
+/// The catalogue is in use already; a name that a spec cannot have, or that there is already; no family.
+pub fn register(kinds: &[&'static EffectKind]) -> Result<(), ModelError> {
+    let refused = |kind: &str, problem: &str| {
+        Err(ModelError::BadEffect { effect: kind.to_owned(), problem: problem.to_owned() })
+    };
+    let mut all = CATALOGUE.to_vec();
+    for kind in kinds {
+        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+        if kind.name.is_empty() || !kind.name.chars().all(is_plain) {
+            return refused(kind.name, "the name of a kind has small letters, digits and underscores");
+        }
+        if all.iter().any(|other| other.name == kind.name) {
+            return refused(kind.name, "there is a kind of that name already");
+        }
+        if kind.family == Family::User {
+            return refused(kind.name, "its family is that of formulas in a pipeline: say which it is of");
+        }
+        all.push(*kind);
+    }
+    let Err(_) = ALL.set(all) else { return Ok(()) };
+    refused(kinds.first().map_or("", |kind| kind.name), "the catalogue is in use: register kinds before")
 }

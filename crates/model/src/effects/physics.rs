@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// A place on the tree where a small twist can act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Slot {
+pub enum Slot {
     /// Right before a segment: what hangs beside it stays where it is.
     Before(SegmentId),
     /// At its end: all that hangs on it moves.
@@ -24,7 +24,7 @@ impl Slot {
 
 /// The sum of what the effects change, in sparse lists.
 #[derive(Debug, Clone)]
-pub(crate) struct Deformation<D: Scalar> {
+pub struct Deformation<D: Scalar> {
     /// Added to the reading of a joint [rad] (prismatic: [m]).
     pub joints: Vec<(usize, D)>,
     /// Added to a parameter of the path, by its index in the parameter vector.
@@ -74,7 +74,7 @@ impl<D: Scalar> Deformation<D> {
 /// The physics of an effect that has been put in its place, written once for every scalar.
 ///
 /// `theta` holds its amplitudes in the order they were declared, then its shapes.
-pub(crate) trait Physics: Debug + Send + Sync + 'static {
+pub trait Physics: Debug + Send + Sync + 'static {
     /// Adds what the effect does to this observation. Zero amplitudes must add exact zeros.
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>);
 
@@ -102,7 +102,7 @@ pub(crate) trait Physics: Debug + Send + Sync + 'static {
 }
 
 /// [`Physics`] for the two scalars in use, so that effects of every kind can stand in one list.
-pub(crate) trait AnyPhysics: Debug + Send + Sync {
+pub trait AnyPhysics: Debug + Send + Sync {
     /// [`Physics::deform`], predicting.
     fn predict(&self, theta: &[f64], x: &Drivers<'_>, change: &mut Deformation<f64>);
     /// [`Physics::deform`], differentiating.

@@ -1,13 +1,14 @@
-//! What the file of every effect is written with.
+//! What the file of every effect is written with, here and in programs that [`register`](super::register) their own.
 
-pub(super) use super::context::{
+pub use super::context::{
     ARM, EffectContext, amplitude, amplitudes_wave, amplitudes_xyz, of_event, shift_xyz, turn_xyz,
 };
-pub(super) use super::drivers::Drivers;
-pub(super) use super::kind::{EffectKind, Family, Lookalikes, Offered, Placement, Shape, Target, Toggle};
-pub(super) use super::physics::{Deformation, Physics, Slot};
+pub use super::drivers::{Drivers, Torque};
+pub use super::kind::{EffectKind, Family, Lookalikes, Offered, Placement, Shape, Target, Toggle};
+pub use super::physics::{Deformation, Physics, Slot};
+pub use crate::rigid::Scalar;
+pub use armcal_core::{Observation, Unit};
+pub use nalgebra::Vector3;
+
 pub(super) use super::state::{LED, REST, SEATED};
 pub(super) use super::torque_terms::TorqueTerms;
-pub(super) use crate::rigid::Scalar;
-pub(super) use armcal_core::{Observation, Unit};
-pub(super) use nalgebra::Vector3;
