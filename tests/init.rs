@@ -284,7 +284,8 @@ fn changed(folder: &Path, configure: impl Fn(&mut LabConfig), change: impl Fn(&m
     config.recordings.truncate(1);
     configure(&mut config);
     let (_, mut logs) =
-        armcal_lab::run(&config, &root().join("pipelines/lab"), &nothing_hidden).expect("a session");
+        armcal_lab::simulate_in_memory(&config, &root().join("pipelines/lab"), &nothing_hidden)
+            .expect("a session");
     logs.iter_mut().for_each(change);
     let recording = |(at, log): (usize, &Log)| {
         let path = folder.join(format!("r{at}.mcap"));

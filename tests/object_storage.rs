@@ -2,7 +2,7 @@
 
 use crate::support::{armcal, number, paper_pipeline, python_with, read_json, root};
 use armcal::Pipeline;
-use armcal_recording::{Recording, is_url, list};
+use armcal_recording::{Recording, is_url, list_objects};
 use serde_json::Value;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -217,12 +217,12 @@ fn in_a_process_that_reaches_the_store() {
     assert!(remote.joints.time_ns.len() > 1000);
     assert_eq!(remote.joints, local.joints);
     assert_eq!(remote.tip, local.tip);
-    let found = |pattern: &str| list(pattern).expect("a list");
+    let found = |pattern: &str| list_objects(pattern).expect("a list");
     assert_eq!(found("s3://lab/*/a*.mcap"), ["s3://lab/day 1/arm.mcap"]);
     assert_eq!(found("s3://lab/**/*.mcap"), ["s3://lab/day 1/arm.mcap"]);
     assert_eq!(found("s3://lab/day 1/arm.mcap"), ["s3://lab/day 1/arm.mcap"]);
     assert!(found("s3://lab/*.mcap").is_empty(), "a star stays within one part of the key");
-    let missing = list("s3://no-such-bucket/*.mcap").expect_err("no bucket").to_string();
+    let missing = list_objects("s3://no-such-bucket/*.mcap").expect_err("no bucket").to_string();
     assert!(missing.contains("no bucket \"no-such-bucket\""), "{missing}");
 }
 

@@ -4,7 +4,7 @@ use armcal_lab::config::{RecordingConfig, StopConfig, TourConfig};
 use armcal_lab::scenario::{Design, Scenario, Size};
 use armcal_lab::{LabConfig, observe};
 use armcal_model::Session;
-use armcal_plan::{Allowed, Known, Place, Proposal, Tracking, propose, standing};
+use armcal_plan::{Allowed, Known, Place, Proposal, Tracking, propose, rivals_from_diagnosis};
 use armcal_score::nominal_model;
 use armcal_table::Board;
 use nalgebra::Matrix3;
@@ -46,7 +46,7 @@ fn ask(config: &LabConfig, allowed: &Allowed) -> Said {
         tracked: Some(Tracking { covariance_m2: Matrix3::identity() * 1e-8, orientation_sigma_rad: None }),
         recordings: config.recordings.iter().map(|r| r.name.clone()).collect(),
     };
-    let open = standing(&diagnosis, model.chain().joint_names()).expect("what stands");
+    let open = rivals_from_diagnosis(&diagnosis, model.chain().joint_names()).expect("what stands");
     let proposal = propose(&known, &open, allowed, &diagnosed).expect("planning");
     Said { diagnosis, proposal }
 }

@@ -1,4 +1,4 @@
-use armcal_mistakes::judge::{Case, Judgement, case};
+use armcal_mistakes::judge::{Case, Judgement, run_case};
 use armcal_mistakes::run::{Place, Statement};
 use armcal_mistakes::{Rig, kinds, sound};
 use std::path::Path;
@@ -25,9 +25,9 @@ const NAMED: &[(&str, Rig)] = &[
 
 fn answer(name: &str, rig: Rig) -> Case {
     let folder = tempfile::tempdir().expect("temporary folder");
-    let kind = kinds::named(name).expect("a kind");
+    let kind = kinds::find_kind(name).expect("a kind");
     let case =
-        case(Path::new(env!("CARGO_BIN_EXE_armcal")), &kind, rig, SEED, folder.path()).expect("a case");
+        run_case(Path::new(env!("CARGO_BIN_EXE_armcal")), &kind, rig, SEED, folder.path()).expect("a case");
     println!("{name} on {rig:?}: {:?}, reported {:?}", case.judgement, case.reported);
     case
 }
@@ -70,7 +70,7 @@ fn a_sound_session_of_each_rig_is_not_accused() {
     for number in 0..6 {
         let folder = tempfile::tempdir().expect("temporary folder");
         let armcal = Path::new(env!("CARGO_BIN_EXE_armcal"));
-        let sound = sound::sound(armcal, number, SEED, folder.path()).expect("a sound session");
+        let sound = sound::run_session(armcal, number, SEED, folder.path()).expect("a sound session");
         assert!(sound.alarms.is_empty(), "{:?}, hidden {}: {:?}", sound.rig, sound.hidden, sound.alarms);
     }
 }

@@ -45,7 +45,7 @@ impl Keys {
     /// A model or board file of the pipeline that cannot be read.
     pub fn new(pipeline: &Pipeline, full: bool, out: &Path) -> Result<Keys, ArchiveError> {
         let mut parts =
-            vec![FORMAT.to_owned(), VERSION.to_owned(), full.to_string(), settings(&pipeline.text)];
+            vec![FORMAT.to_owned(), VERSION.to_owned(), full.to_string(), relevant_settings(&pipeline.text)];
         let models = pipeline.models().into_iter();
         let model = models.flat_map(|model| [&model.dh, &model.urdf]).flatten();
         let board = pipeline.table.iter().map(|t| &t.board);
@@ -63,7 +63,7 @@ impl Keys {
     /// A file that cannot be read.
     pub fn of_recording(&self, entry: &RecordingEntry) -> Result<String, ArchiveError> {
         let in_recording = |source| RunError::Recording { recording: entry.name(), source };
-        let mut parts = vec![self.common.clone(), declared(entry)];
+        let mut parts = vec![self.common.clone(), declaration_hash(entry)];
         for path in &entry.paths {
             parts.push(self.identity(path).map_err(in_recording)?);
         }
@@ -73,7 +73,8 @@ impl Keys {
     /// What all shares of one campaign have in common: settings and manifest.
     pub fn of_campaign(&self, manifest: &Manifest) -> String {
         let path = |p: &PathBuf| p.to_string_lossy().into_owned();
-        let entry = |e: &RecordingEntry| hash(std::iter::once(declared(e)).chain(e.paths.iter().map(path)));
+        let entry =
+            |e: &RecordingEntry| hash(std::iter::once(declaration_hash(e)).chain(e.paths.iter().map(path)));
         hash(std::iter::once(self.common.clone()).chain(manifest.entries.iter().map(entry)))
     }
 
@@ -83,9 +84,9 @@ impl Keys {
         let memory = self.out.join(SEEN).join(format!("{}.json", &hash([name.clone()])[..32]));
         let (logs, description) = read_with(path);
         let beside = logs.iter().chain(&description).map(PathBuf::as_path);
-        let sizes: Option<Vec<_>> = std::iter::once(path).chain(beside).map(size).collect();
+        let sizes: Option<Vec<_>> = std::iter::once(path).chain(beside).map(size_and_mtime).collect();
         // Armcal's own notes, to be written over: no input.
-        let known = input::regular(&memory)
+        let known = input::open_regular(&memory)
             .ok()
             .and_then(|file| serde_json::from_reader::<_, Seen>(file.take(NOTE_BYTES)).ok());
         if let (Some(sizes), Some(known)) = (&sizes, known) {
@@ -112,14 +113,14 @@ impl Keys {
 }
 
 /// Size and time of the last change of a file; `None` of what is not there, such as an object.
-fn size(path: &Path) -> Option<(u64, u128)> {
+fn size_and_mtime(path: &Path) -> Option<(u64, u128)> {
     let about = std::fs::metadata(path).ok()?;
     let modified = about.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok());
     Some((about.len(), modified.map_or(0, |t| t.as_nanos())))
 }
 
 /// The pipeline without what says nothing about how a recording is worked on; a text that is no TOML as it is.
-fn settings(text: &str) -> String {
+fn relevant_settings(text: &str) -> String {
     let Ok(mut table) = text.parse::<toml::Table>() else { return text.to_owned() };
     for section in ["recordings", "check", "verify"] {
         table.remove(section);
@@ -127,7 +128,7 @@ fn settings(text: &str) -> String {
     table.to_string()
 }
 
-fn declared(entry: &RecordingEntry) -> String {
+fn declaration_hash(entry: &RecordingEntry) -> String {
     let RecordingEntry { tilt, load_kg, loads, points, .. } = entry;
     let points = points.as_ref().map_or(String::new(), |points| {
         let content = input::read_to_string(&points.csv, input::Kind::Data).unwrap_or_default();

@@ -93,13 +93,13 @@ fn work_on(
     let own: Vec<usize> = (0..manifest.entries.len()).filter(|i| shard.has(*i)).collect();
     counter.count(own.len());
     let jobs = request.jobs.unwrap_or_else(workers::cores);
-    let done = workers::each(own.len(), jobs, |i| {
+    let done = workers::parallel_map(own.len(), jobs, |i| {
         let index = own[i];
         let entry = &manifest.entries[index];
-        let (done, skipped) = match work::one(pipeline, entry, &keys, &store, request.full) {
+        let (done, skipped) = match work::ensure_result(pipeline, entry, &keys, &store, request.full) {
             Ok((folder, skipped)) => (Done::Calibrated { index, folder }, skipped),
             Err(e) => {
-                let failed = FailedRecording { why: e.to_string(), ..work::named(entry) };
+                let failed = FailedRecording { why: e.to_string(), ..work::failed_recording(entry) };
                 counter.say(&format!("failed: {}: {}", failed.recording, failed.why));
                 (Done::Failed { index, failed }, false)
             }
@@ -120,7 +120,7 @@ fn put_together(
     completion_markers: Vec<CompletionMarker>,
     out: &Path,
 ) -> Result<(Campaign, Vec<PathBuf>), ArchiveError> {
-    let (pipeline, done) = shard::together(completion_markers, out)?;
+    let (pipeline, done) = shard::merge_shards(completion_markers, out)?;
     let store = Store::open(out)?;
     let (mut rows, mut folders, mut failed) = (Vec::new(), Vec::new(), Vec::new());
     let mut names = BTreeSet::new();
@@ -135,8 +135,8 @@ fn put_together(
             Done::Failed { failed: one, .. } => failed.push(one),
         }
     }
-    let repeats = once::repeats(&store, &rows, &folders)?;
-    let results = rows.into_iter().zip(folders.iter().map(|folder| store::relative(folder))).collect();
+    let repeats = once::find_repeats(&store, &rows, &folders)?;
+    let results = rows.into_iter().zip(folders.iter().map(|folder| store::result_path(folder))).collect();
     let campaign = Campaign::of(&pipeline, results, failed, repeats);
     let written = write_campaign(&campaign, out)?;
     Ok((campaign, written))

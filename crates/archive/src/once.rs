@@ -13,7 +13,11 @@ use std::collections::btree_map::Entry;
 ///
 /// # Errors
 /// Observations of a result that cannot be read.
-pub(super) fn repeats(store: &Store, rows: &[Row], folders: &[String]) -> Result<Vec<Repeat>, ArchiveError> {
+pub(super) fn find_repeats(
+    store: &Store,
+    rows: &[Row],
+    folders: &[String],
+) -> Result<Vec<Repeat>, ArchiveError> {
     let mut marks: BTreeMap<usize, Vec<DwellMark>> = BTreeMap::new();
     let mut repeats: Vec<Repeat> = Vec::new();
     let mut originals: Vec<usize> = Vec::new();

@@ -175,7 +175,7 @@ pub(super) fn completion_markers(out: &Path) -> Result<Vec<CompletionMarker>, Ar
 ///
 /// # Errors
 /// Shares of different campaigns or partitions, missing ones, a recording in two of them or in none.
-pub(super) fn together(
+pub(super) fn merge_shards(
     completion_markers: Vec<CompletionMarker>,
     out: &Path,
 ) -> Result<(String, Vec<Done>), ArchiveError> {

@@ -7,8 +7,8 @@ fn completion_marker(number: usize, of: usize, recordings: usize) -> CompletionM
     CompletionMarker::new(shard, "key".into(), "p", recordings, done, 0)
 }
 
-fn refused(completion_markers: Vec<CompletionMarker>) -> String {
-    together(completion_markers, Path::new("D")).expect_err("no whole").to_string()
+fn merge_error(completion_markers: Vec<CompletionMarker>) -> String {
+    merge_shards(completion_markers, Path::new("D")).expect_err("no whole").to_string()
 }
 
 #[test]
@@ -18,26 +18,28 @@ fn any_number_of_shares_is_the_same_in_the_end() {
         let mut completion_markers: Vec<CompletionMarker> =
             (1..=of).map(|number| completion_marker(number, of, 10)).collect();
         completion_markers.reverse();
-        let (_, done) = together(completion_markers, Path::new("D")).expect("a whole");
+        let (_, done) = merge_shards(completion_markers, Path::new("D")).expect("a whole");
         assert_eq!(done.iter().map(Done::index).collect::<Vec<_>>(), (0..10).collect::<Vec<_>>());
     }
 }
 
 #[test]
 fn what_is_missing_or_doubled_is_named() {
-    let missing = refused(vec![completion_marker(1, 4, 9), completion_marker(3, 4, 9)]);
+    let missing = merge_error(vec![completion_marker(1, 4, 9), completion_marker(3, 4, 9)]);
     assert!(missing.contains("2/4, 4/4 is missing"), "{missing}");
     let twice =
-        refused(vec![completion_marker(1, 2, 9), completion_marker(2, 2, 9), completion_marker(2, 2, 9)]);
+        merge_error(vec![completion_marker(1, 2, 9), completion_marker(2, 2, 9), completion_marker(2, 2, 9)]);
     assert!(twice.contains("2/2 is there twice"), "{twice}");
-    let mixed = refused(vec![completion_marker(1, 2, 9), completion_marker(2, 3, 9)]);
+    let mixed = merge_error(vec![completion_marker(1, 2, 9), completion_marker(2, 3, 9)]);
     assert!(mixed.contains("1/2 and 2/3"), "{mixed}");
     let other = CompletionMarker { campaign: "another".into(), ..completion_marker(2, 2, 9) };
-    assert!(refused(vec![completion_marker(1, 2, 9), other]).contains("1/2 and 2/2 are not of one manifest"));
+    assert!(
+        merge_error(vec![completion_marker(1, 2, 9), other]).contains("1/2 and 2/2 are not of one manifest")
+    );
     let mut short = completion_marker(2, 2, 9);
     short.done.pop();
-    assert!(refused(vec![completion_marker(1, 2, 9), short]).contains("recording 8 of the manifest"));
-    assert!(refused(Vec::new()).contains("no share"));
+    assert!(merge_error(vec![completion_marker(1, 2, 9), short]).contains("recording 8 of the manifest"));
+    assert!(merge_error(Vec::new()).contains("no share"));
 }
 
 #[test]

@@ -105,7 +105,7 @@ impl Store {
         let at = |source| ArchiveError::Folder { path: target.clone(), source };
         write_one(&made.path().join(ROW), &serde_json::to_vec_pretty(row).map_err(ArchiveError::Json)?)?;
         readable_by_all(made.path()).map_err(at)?;
-        match named(made.path(), &target) {
+        match publish_folder(made.path(), &target) {
             Ok(()) => {
                 // It has another name now, under which it stays.
                 let _ = made.folder.keep();
@@ -144,7 +144,7 @@ impl Unfinished {
 }
 
 /// A result's folder as seen from the campaign's.
-pub(super) fn relative(folder: &str) -> String {
+pub(super) fn result_path(folder: &str) -> String {
     format!("{RESULTS}/{folder}")
 }
 
@@ -159,14 +159,16 @@ pub(super) fn write_one(path: &Path, bytes: &[u8]) -> Result<(), ArchiveError> {
 fn lock_file(path: &Path) -> std::io::Result<File> {
     let made = File::options().create_new(true).write(true).open(path);
     match made {
-        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && !path.is_symlink() => input::regular(path),
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && !path.is_symlink() => {
+            input::open_regular(path)
+        }
         made => made,
     }
 }
 
 /// Gives a finished folder its name. A folder with anything in it is never replaced: the system refuses that.
 #[allow(clippy::disallowed_methods, reason = "the lock is armcal's own, and so is the folder")]
-fn named(made: &Path, target: &Path) -> std::io::Result<()> {
+fn publish_folder(made: &Path, target: &Path) -> std::io::Result<()> {
     std::fs::remove_file(made.join(LOCK))?;
     std::fs::rename(made, target)?;
     // The rename itself must survive a power cut too; not every file system can sync a folder.
@@ -180,21 +182,21 @@ fn named(made: &Path, target: &Path) -> std::io::Result<()> {
 /// already, by its row.
 #[allow(clippy::disallowed_methods, reason = "the folder is armcal's own")]
 fn remove_abandoned(folder: &Path) {
-    let free = match input::regular(&folder.join(LOCK)) {
+    let free = match input::open_regular(&folder.join(LOCK)) {
         Ok(lock) => lock.try_lock().is_ok(),
         // Between removing the lock and renaming.
-        Err(_) => folder.join(ROW).is_file() && old(folder),
+        Err(_) => folder.join(ROW).is_file() && is_stale(folder),
     };
     if free {
         let _ = std::fs::remove_dir_all(folder);
-    } else if old(folder) {
+    } else if is_stale(folder) {
         // Killed before there was a lock: empty, or not ours.
         let _ = std::fs::remove_dir(folder);
     }
 }
 
 /// Older than any such moment takes.
-fn old(path: &Path) -> bool {
+fn is_stale(path: &Path) -> bool {
     let modified = std::fs::metadata(path).and_then(|about| about.modified());
     modified.is_ok_and(|t| t.elapsed().is_ok_and(|age| age.as_secs() > 600))
 }

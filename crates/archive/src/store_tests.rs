@@ -1,6 +1,6 @@
 use super::*;
 
-fn files(folder: &Path) -> Vec<String> {
+fn file_names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).expect("a folder").flatten();
     let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
     names.retain(|name| name != GATE);
@@ -18,12 +18,12 @@ fn what_a_killed_process_left_is_taken_away_and_what_a_living_one_makes_is_not()
     // The lock of a killed process is gone, its folder is not.
     let path = dead.folder.keep();
     drop(dead._lock);
-    assert_eq!(files(&store.results).len(), 2);
+    assert_eq!(file_names(&store.results).len(), 2);
     let again = Store::open(out.path()).expect("a store");
     assert!(!path.exists());
     assert!(living.path().exists());
     drop(living);
-    assert!(files(&again.results).is_empty());
+    assert!(file_names(&again.results).is_empty());
 }
 
 #[test]

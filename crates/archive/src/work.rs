@@ -13,7 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 ///
 /// # Errors
 /// Whatever stops `armcal run` on this recording alone; a panic too, so that it does not stop the others.
-pub(super) fn one(
+pub(super) fn ensure_result(
     pipeline: &Pipeline,
     entry: &RecordingEntry,
     keys: &Keys,
@@ -24,8 +24,9 @@ pub(super) fn one(
     if store.has(&folder) {
         return Ok((folder, true));
     }
-    let made =
-        catch_unwind(AssertUnwindSafe(|| make(&pipeline.of_recording(entry), entry, store, &folder, full)));
+    let made = catch_unwind(AssertUnwindSafe(|| {
+        compute_result(&pipeline.of_recording(entry), entry, store, &folder, full)
+    }));
     match made {
         Ok(result) => result.map(|()| (folder, false)),
         Err(panic) => {
@@ -36,7 +37,7 @@ pub(super) fn one(
     }
 }
 
-fn make(
+fn compute_result(
     pipeline: &Pipeline,
     entry: &RecordingEntry,
     store: &Store,
@@ -61,7 +62,7 @@ fn make(
 }
 
 /// What a failure is about.
-pub(super) fn named(entry: &RecordingEntry) -> FailedRecording {
+pub(super) fn failed_recording(entry: &RecordingEntry) -> FailedRecording {
     FailedRecording {
         recording: entry.name(),
         paths: entry.paths.iter().map(|p| p.to_string_lossy().into_owned()).collect(),

@@ -13,11 +13,11 @@ const JOBS_A_CORE: usize = 4;
 /// As many are worked on at a time as there are cores, each on its own: nobody waits for anybody, and no more than that
 /// are in memory. Where there are fewer than cores, each gets several for its chunks and candidates. Where the system refuses
 /// threads, it goes on with those that there are.
-pub(super) fn each<T: Send>(count: usize, jobs: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub(super) fn parallel_map<T: Send>(count: usize, jobs: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let jobs = jobs.clamp(1, JOBS_A_CORE * cores());
     let workers = jobs.min(count.max(1));
     let threads = |worker: usize| jobs / workers + usize::from(worker < jobs % workers);
-    let pools: Vec<ThreadPool> = (0..workers).map_while(|worker| pool(threads(worker)).ok()).collect();
+    let pools: Vec<ThreadPool> = (0..workers).map_while(|worker| thread_pool(threads(worker)).ok()).collect();
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));
     // Without a pool of its own, in that of the process.
@@ -53,7 +53,7 @@ pub(super) fn cores() -> usize {
 }
 
 /// Threads of a worker, or one, where the system does not give so many.
-fn pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
+fn thread_pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
     let of = |threads| ThreadPoolBuilder::new().num_threads(threads).build();
     of(threads).or_else(|_| of(1))
 }

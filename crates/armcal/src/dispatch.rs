@@ -6,17 +6,17 @@ use crate::commands::{
     inspect, man, plan, pool, run, simulate, transfer, verify, view, write,
 };
 use crate::error::Error;
-use crate::stdout::tell;
+use crate::stdout::print_warnings;
 use armcal_config::Manifest;
 use armcal_held_out::Asked;
-use armcal_recording::losses;
+use armcal_recording::data_loss_warnings;
 use armcal_report::Detail;
 use clap::CommandFactory as _;
 
 /// Runs the command a user typed. None ends as if all was well where a recording lost data.
 pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
-    let outcome = command(cli);
-    let lost = losses();
+    let outcome = run_command(cli);
+    let lost = data_loss_warnings();
     // These tell what their recordings lost among their results.
     let tells = matches!(
         cli.command,
@@ -29,7 +29,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
             | Command::View { .. }
     );
     if !tells || !matches!(outcome, Ok(Outcome::CompletedWithWarnings)) {
-        tell(&lost);
+        print_warnings(&lost);
     }
     match outcome {
         // What a check accepts of lost data is said in its limits.
@@ -40,7 +40,7 @@ pub fn dispatch(cli: &Cli) -> Result<Outcome, Error> {
     }
 }
 
-fn command(cli: &Cli) -> Result<Outcome, Error> {
+fn run_command(cli: &Cli) -> Result<Outcome, Error> {
     match &cli.command {
         Command::Check(asked) => check::run(asked),
         Command::Batch { inputs, pipeline, out, full, jobs, json } => {
@@ -65,13 +65,15 @@ fn command(cli: &Cli) -> Result<Outcome, Error> {
         Command::Effects { name, json } => effects::run(name.as_deref(), *json),
         Command::Plan(asked) => plan::run(asked),
         Command::Pool { pipeline, results, out, verbose, json } => {
-            pool::run(pipeline, results, out, detail(*verbose), *json)
+            pool::run(pipeline, results, out, report_detail(*verbose), *json)
         }
-        Command::Run { pipeline, out, verbose, json } => run::run(pipeline, out, detail(*verbose), *json),
+        Command::Run { pipeline, out, verbose, json } => {
+            run::run(pipeline, out, report_detail(*verbose), *json)
+        }
         Command::Init(asked) => init::run(asked),
         Command::Inspect { inputs, json } => inspect::run(inputs, *json),
         Command::Simulate { hide: Some(family), design, size, out, seed, .. } => {
-            simulate::hide(family, design, size, out, seed.unwrap_or(1))
+            simulate::hide_effect(family, design, size, out, seed.unwrap_or(1))
         }
         Command::Simulate { lab, out, seed, .. } => simulate::run(lab.as_deref(), out, *seed),
         Command::Transfer { from, to, effects, json } => transfer::run(&Asked { from, to, effects }, *json),
@@ -85,6 +87,6 @@ fn command(cli: &Cli) -> Result<Outcome, Error> {
     }
 }
 
-fn detail(verbose: bool) -> Detail {
+fn report_detail(verbose: bool) -> Detail {
     if verbose { Detail::Everything } else { Detail::Story }
 }

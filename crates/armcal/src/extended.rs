@@ -3,7 +3,7 @@
 use crate::error::Error;
 use armcal_config::Pipeline;
 use armcal_model::{EffectSpec, EffectTable, tables_toml};
-use armcal_recording::{is_marked, may_put, sealed};
+use armcal_recording::{is_marked, may_put, seal_text};
 use std::path::{Path, PathBuf};
 
 /// First line of an extended pipeline whose original has no such line.
@@ -19,7 +19,7 @@ pub struct Extended {
 /// Appends `[[effects]]` tables to the pipeline's own text, so that comments and order stay as the user wrote them.
 ///
 /// `original` is the pipeline's file; the extended one goes to `write`, or beside it.
-pub fn extend(
+pub fn extend_pipeline(
     pipeline: &Pipeline,
     original: &Path,
     write: Option<&Path>,
@@ -33,8 +33,8 @@ pub fn extend(
     let text = format!("{}\n\n# Added by `armcal add`.\n{tables}", pipeline.text.trim_end());
     // By the mark its own maker knows the file again, and what somebody changes in it.
     let marked = if is_marked(&text) { text } else { format!("{MARK}\n{text}") };
-    let text = sealed(&marked).into_owned();
-    let path = write.map_or_else(|| beside(original, new), Path::to_owned);
+    let text = seal_text(&marked).into_owned();
+    let path = write.map_or_else(|| extended_path(original, new), Path::to_owned);
     let pipeline = Pipeline::parse(&path, text, &pipeline.folder)?;
     may_put(&path, pipeline.text.as_bytes()).map_err(Error::Output)?;
     Ok(Extended { pipeline, path })
@@ -46,7 +46,7 @@ pub fn set_of<'s>(name: &str, sets: &'s [Vec<String>]) -> Option<&'s Vec<String>
 }
 
 /// `paper.toml` and `backlash:1` give `paper+backlash-1.toml`.
-fn beside(pipeline: &Path, new: &[EffectSpec]) -> PathBuf {
+fn extended_path(pipeline: &Path, new: &[EffectSpec]) -> PathBuf {
     let stem = pipeline.file_stem().unwrap_or_default().to_string_lossy();
     let safe = |c: char| if c.is_ascii_alphanumeric() || "_.".contains(c) { c } else { '-' };
     let names: String =

@@ -15,14 +15,14 @@ fn main() -> ExitCode {
         Ok(cli) => cli,
         // Help and version are results; usage errors clap prints itself and exits with 2.
         Err(asked) if !asked.use_stderr() => {
-            return ended(stdout::written(|_| asked.print()).map(|()| Outcome::Done));
+            return exit_code(stdout::write_stdout(|_| asked.print()).map(|()| Outcome::Done));
         }
         Err(mistake) => mistake.exit(),
     };
-    ended(threads::start().and_then(|()| dispatch(&cli)))
+    exit_code(threads::start_workers().and_then(|()| dispatch(&cli)))
 }
 
-fn ended(result: Result<Outcome, Error>) -> ExitCode {
+fn exit_code(result: Result<Outcome, Error>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::CompletedWithWarnings) => ExitCode::from(3),
@@ -32,7 +32,7 @@ fn ended(result: Result<Outcome, Error>) -> ExitCode {
             let _ = writeln!(
                 std::io::stderr(),
                 "error: {}",
-                stdout::harmless(&error.to_string(), TerminalStyle::Plain)
+                stdout::escape_control_characters(&error.to_string(), TerminalStyle::Plain)
             );
             ExitCode::from(error.exit_code())
         }

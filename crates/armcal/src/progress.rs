@@ -1,7 +1,7 @@
 //! What is being done now, on stderr, when somebody watches.
 
 use armcal_archive::Counter;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_stages::Steps;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write as _;
@@ -61,7 +61,7 @@ impl Counter for Progress {
     /// Above the line.
     fn say(&self, text: &str) {
         // A closed stderr leaves nowhere to tell it; results will.
-        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{}", printable(text))));
+        self.bar.suspend(|| drop(writeln!(std::io::stderr(), "{}", printable_name(text))));
     }
 }
 

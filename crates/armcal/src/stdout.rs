@@ -14,7 +14,7 @@ const TOLD: usize = 20;
 /// # Errors
 /// [`Error::Stdout`] where it cannot be written: a full disk.
 pub fn print(text: &str) -> Result<(), Error> {
-    written(|out| out.write_all(harmless(text, style()).as_bytes()))
+    write_stdout(|out| out.write_all(escape_control_characters(text, terminal_style()).as_bytes()))
 }
 
 /// Prints a value as JSON, without holding the text of all of it.
@@ -22,7 +22,7 @@ pub fn print(text: &str) -> Result<(), Error> {
 /// # Errors
 /// As [`print`].
 pub fn print_json(value: &impl serde::Serialize) -> Result<(), Error> {
-    written(|out| {
+    write_stdout(|out| {
         let mut lines = Lines { out, pending: Vec::new() };
         serde_json::to_writer_pretty(&mut lines, value)?;
         lines.pending.push(b'\n');
@@ -50,7 +50,7 @@ impl io::Write for Lines<'_> {
 
     fn flush(&mut self) -> io::Result<()> {
         let text = String::from_utf8_lossy(&self.pending);
-        self.out.write_all(harmless(&text, style()).as_bytes())?;
+        self.out.write_all(escape_control_characters(&text, terminal_style()).as_bytes())?;
         self.pending.clear();
         Ok(())
     }
@@ -60,7 +60,7 @@ impl io::Write for Lines<'_> {
 ///
 /// # Errors
 /// As [`print`].
-pub fn written(write: impl FnOnce(&mut dyn io::Write) -> io::Result<()>) -> Result<(), Error> {
+pub fn write_stdout(write: impl FnOnce(&mut dyn io::Write) -> io::Result<()>) -> Result<(), Error> {
     #[allow(clippy::disallowed_methods, reason = "this is where results are printed")]
     let mut out = io::stdout().lock();
     match write(&mut out).and_then(|()| out.flush()) {
@@ -71,7 +71,7 @@ pub fn written(write: impl FnOnce(&mut dyn io::Write) -> io::Result<()>) -> Resu
 
 /// A text without control characters that a terminal would obey: names in it come from recordings. Lines, tabs and, where
 /// we use them, colours stay; the others become `\u001b`, which also leaves JSON what it is.
-pub fn harmless(text: &str, style: TerminalStyle) -> Cow<'_, str> {
+pub fn escape_control_characters(text: &str, style: TerminalStyle) -> Cow<'_, str> {
     // Overrides of the writing direction would let a name rewrite the rest of its line.
     let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let is_harmless = |c: char| matches!(c, '\n' | '\t') || !c.is_control() && !turns(c);
@@ -100,33 +100,33 @@ fn colour_code(text: &str) -> Option<&str> {
 }
 
 /// Colours on a terminal, unless the user asked for none.
-pub fn style() -> TerminalStyle {
+pub fn terminal_style() -> TerminalStyle {
     #[allow(clippy::disallowed_methods, reason = "nothing is written")]
     let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
     if colour { TerminalStyle::Colour } else { TerminalStyle::Plain }
 }
 
 /// Says on stderr what recordings lost, where results have no place for it.
-pub fn tell(lost: &[Warning]) {
+pub fn print_warnings(lost: &[Warning]) {
     let mut lines =
         lost.iter().take(TOLD).map(|w| format!("{}: {w}\n", w.severity.word())).collect::<String>();
     if lost.len() > TOLD {
         lines += &format!("and {} more; `armcal inspect` lists them\n", lost.len() - TOLD);
     }
     // A closed stderr leaves nowhere to complain to; the exit code still tells.
-    let _ = std::io::stderr().write_all(harmless(&lines, TerminalStyle::Plain).as_bytes());
+    let _ = std::io::stderr().write_all(escape_control_characters(&lines, TerminalStyle::Plain).as_bytes());
 }
 
 #[cfg(test)]
 mod tests {
-    use super::harmless;
+    use super::escape_control_characters;
     use armcal_report::TerminalStyle::{Colour, Plain};
 
     #[test]
     fn only_colours_and_lines_reach_the_terminal_as_they_are() {
         let ours = "\u{1b}[1mtitle\u{1b}[0m\n\tcell \u{1b}[38;5;11mü\u{1b}[39m";
-        assert_eq!(harmless(ours, Colour), ours);
-        assert_eq!(harmless("\u{1b}[1mtitle\n", Plain), "\\u001b[1mtitle\n");
+        assert_eq!(escape_control_characters(ours, Colour), ours);
+        assert_eq!(escape_control_characters("\u{1b}[1mtitle\n", Plain), "\\u001b[1mtitle\n");
         // Title, clipboard, screen, cursor, a C1 introducer, backspaces, carriage return.
         for (evil, shown) in [
             ("\u{1b}]0;pwned\u{7}", "\\u001b]0;pwned\\u0007"),
@@ -137,10 +137,11 @@ mod tests {
             ("a\u{202e}b", "a\\u202eb"),
             ("\u{1b}[31", "\\u001b[31"),
         ] {
-            assert_eq!(harmless(evil, Colour), shown);
+            assert_eq!(escape_control_characters(evil, Colour), shown);
         }
         let json = serde_json::json!({ "name": "a\u{9b}b\u{7f}" });
-        let printed = serde_json::from_str::<serde_json::Value>(&harmless(&json.to_string(), Plain));
+        let printed =
+            serde_json::from_str::<serde_json::Value>(&escape_control_characters(&json.to_string(), Plain));
         assert_eq!(printed.ok(), Some(json));
     }
 }

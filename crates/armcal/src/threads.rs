@@ -13,11 +13,11 @@ const REFUSALS: usize = 3;
 ///
 /// # Errors
 /// The system gives none at all.
-pub fn start() -> Result<(), Error> {
+pub fn start_workers() -> Result<(), Error> {
     let refused = |e: &dyn std::fmt::Display| Error::Threads { why: e.to_string() };
     let mut idle: Vec<Sender<ThreadBuilder>> = Vec::new();
     let mut refusals: Vec<io::Error> = Vec::new();
-    while idle.len() < wanted() && refusals.len() < REFUSALS {
+    while idle.len() < worker_count() && refusals.len() < REFUSALS {
         let (sender, receiver) = channel::<ThreadBuilder>();
         let work = move || receiver.recv().into_iter().for_each(ThreadBuilder::run);
         match std::thread::Builder::new().spawn(work) {
@@ -37,7 +37,7 @@ pub fn start() -> Result<(), Error> {
 }
 
 /// As many as rayon would start.
-fn wanted() -> usize {
+fn worker_count() -> usize {
     let told = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse::<usize>().ok());
     told.filter(|threads| *threads > 0)
         .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))

@@ -20,7 +20,7 @@ const ROUNDS: usize = 200;
 const SETTLED: f64 = 1e-3;
 
 /// The alternation on all observations; what a recording has copies of then on its own ones.
-pub(crate) fn aligned(
+pub(crate) fn closed_form_start(
     problem: &ModelProblem<'_>,
     config: &FitConfig,
     start: Vec<f64>,

@@ -15,13 +15,13 @@ use crate::fit::{Near, fit_near, fit_where_priors};
 use crate::fit_warnings;
 use crate::frames;
 use crate::holdout::{self, Holdout};
-use crate::model_problem::{ModelProblem, describe, position_covariance_m2, whitened};
+use crate::model_problem::{ModelProblem, describe_observation, position_covariance_m2, whiten_position};
 use crate::noise::expected_norm_m;
 use crate::nominal::{self, Nominal, Start};
 use crate::outcome::{Calibration, Fit, Residual, SideErrors};
 use crate::poses::measured_together;
 use crate::priors::scales_of;
-use crate::remembered::{Looked, look, stays};
+use crate::remembered::{Looked, evaluate_problem, keeps_derivative};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, fit_problem};
 use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::{Model, ModelResidual};
@@ -56,7 +56,7 @@ pub fn calibrate_beside(
         return Err(CalibrateError::NoObservations { context: String::new() });
     }
     let holdout = holdout::resolve(holdout, observations, &frames::board_names(model))?;
-    judged(&Judge { model, observations, config, nominal }, &holdout)
+    fit_folds(&Judge { model, observations, config, nominal }, &holdout)
 }
 
 /// The observations that a hold-out keeps from the fit in each of its turns, as indices in rising order.
@@ -72,10 +72,10 @@ pub fn holdout_turns(
 }
 
 /// Fits in the turns of the hold-out and pools their errors.
-fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, CalibrateError> {
+fn fit_folds(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, CalibrateError> {
     if let (false, [held]) = (holdout.in_turn, holdout.turns.as_slice()) {
         let turn = judge.turn((held, judge.nominal.turns.first()), None)?;
-        return gathered(judge, holdout, std::slice::from_ref(&turn), turn.clone());
+        return assemble_calibration(judge, holdout, std::slice::from_ref(&turn), turn.clone());
     }
     let last = judge.turn((&[], judge.nominal.of_all.as_ref()), None)?;
     // A turn iterates to its own minimum; only its way there is shorter from the minimum of all, and of many dwells the
@@ -89,7 +89,7 @@ fn judged(judge: &Judge<'_>, holdout: &Holdout) -> Result<Calibration, Calibrate
     let turn = |(k, held): (usize, &Vec<usize>)| judge.turn((held, judge.nominal.turns.get(k)), near);
     let turns: Vec<Result<Fold, CalibrateError>> = holdout.turns.par_iter().enumerate().map(turn).collect();
     let turns = turns.into_iter().collect::<Result<Vec<Fold>, CalibrateError>>()?;
-    gathered(judge, holdout, &turns, last)
+    assemble_calibration(judge, holdout, &turns, last)
 }
 
 /// A fit outside a held-out set, completed by the frames that only the held-out set shows.
@@ -130,7 +130,7 @@ impl Fold {
 }
 
 /// Residuals and errors of all turns and the last fit.
-fn gathered(
+fn assemble_calibration(
     judge: &Judge<'_>,
     holdout: &Holdout,
     turns: &[Fold],
@@ -153,7 +153,7 @@ fn gathered(
         train.iter().chain(residuals.iter().filter(|r| !r.held_out && !holdout.in_turn)).collect();
     let judged = if held.is_empty() { &seen } else { &held };
     let noise_floor_m = judged.iter().map(|r| r.expected_norm_m).sum::<f64>() / judged.len() as f64;
-    let (train, holdout_errors) = (errors(&seen), errors(&held));
+    let (train, holdout_errors) = (side_errors(&seen), side_errors(&held));
     let prediction_factor = match held.is_empty() {
         true => 1.0,
         false => turns.iter().map(Fold::prediction_factor).sum::<f64>() / turns.len() as f64,
@@ -260,7 +260,7 @@ impl Judge<'_> {
             }
             let start = frames::fit_some(&test, fit.values(), self.config, &of_unseen)?;
             let frozen = fit_problem(&test, &start, &|p| p.free && of_unseen(p), self.config)?;
-            adopt(&mut fit, &frozen, &of_unseen);
+            adopt_frames(&mut fit, &frozen, &of_unseen);
             warnings.push(fitted_on_held_out(&unseen));
         }
         Ok(Fold { warnings, ..Fold::new(fit, nominal_values, held, self.observations) })
@@ -277,8 +277,8 @@ impl Judge<'_> {
         let one = |((&i, fitted), nominal): ((&usize, ModelResidual), ModelResidual)| {
             let o = &self.observations[i];
             let covariance = position_covariance_m2(self.model, &turn.values, o);
-            let whitened = whitened(&fitted, &covariance)
-                .ok_or_else(|| CalibrateError::BadCovariance { observation: describe(o) })?;
+            let whitened = whiten_position(&fitted, &covariance)
+                .ok_or_else(|| CalibrateError::BadCovariance { observation: describe_observation(o) })?;
             Ok(Residual {
                 dwell: o.dwell,
                 held_out,
@@ -316,10 +316,10 @@ impl Judge<'_> {
             return Ok(All { last, looked: None, frames: None });
         }
         let problem = ModelProblem::new(self.model, self.observations, self.config)?;
-        let looked = look(&problem, &last.values, &|p| p.free, self.config)?;
-        let frames = match self.nominal.turns.len() == turns || !stays(&problem) {
+        let looked = evaluate_problem(&problem, &last.values, &|p| p.free, self.config)?;
+        let frames = match self.nominal.turns.len() == turns || !keeps_derivative(&problem) {
             true => None,
-            false => frames::look(&problem, &last.nominal_values, self.config)?,
+            false => frames::evaluate_frames(&problem, &last.nominal_values, self.config)?,
         };
         Ok(All { last, looked: Some(looked), frames })
     }
@@ -349,7 +349,7 @@ impl Judge<'_> {
 }
 
 /// Takes the parameters of frames fitted on the held-out set into the training fit.
-fn adopt(fit: &mut Fit, frozen: &Fit, of_unseen: &dyn Fn(&Parameter) -> bool) {
+fn adopt_frames(fit: &mut Fit, frozen: &Fit, of_unseen: &dyn Fn(&Parameter) -> bool) {
     let taken: Vec<usize> =
         (0..fit.estimates.len()).filter(|&k| of_unseen(&fit.estimates[k].parameter)).collect();
     for &row in &taken {
@@ -365,7 +365,7 @@ fn fitted_on_held_out(unseen: &[String]) -> Warning {
     Warning::new(Severity::Notice, Stage::Calibrate, "frame-fitted-on-holdout", unseen.join(", "), message)
 }
 
-fn errors(residuals: &[&Residual]) -> SideErrors {
+fn side_errors(residuals: &[&Residual]) -> SideErrors {
     let norms =
         |of: fn(&Residual) -> Vector3<f64>| -> Vec<f64> { residuals.iter().map(|r| of(r).norm()).collect() };
     SideErrors {

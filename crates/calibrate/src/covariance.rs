@@ -102,11 +102,11 @@ impl Covariance {
             let of_own = units(&own.index);
             Own {
                 index: moved(&own.index),
-                conditional: scaled(&own.conditional, &of_own, &of_own),
-                gain: scaled(&own.gain, &of_own, &of_shared.map(f64::recip)),
+                conditional: scale_entries(&own.conditional, &of_own, &of_own),
+                gain: scale_entries(&own.gain, &of_own, &of_shared.map(f64::recip)),
             }
         });
-        let covariance = scaled(&self.of_shared, &of_shared, &of_shared);
+        let covariance = scale_entries(&self.of_shared, &of_shared, &of_shared);
         Covariance::new(count, moved(&self.shared), covariance, own.collect())
     }
 
@@ -141,6 +141,6 @@ impl From<DMatrix<f64>> for Covariance {
     }
 }
 
-fn scaled(m: &DMatrix<f64>, rows: &DVector<f64>, columns: &DVector<f64>) -> DMatrix<f64> {
+fn scale_entries(m: &DMatrix<f64>, rows: &DVector<f64>, columns: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows(), m.ncols(), |r, c| rows[r] * columns[c] * m[(r, c)])
 }

@@ -10,7 +10,7 @@ const NO_INFORMATION: f64 = 1e-6;
 /// `joint2.d - joint3.d: the axes of joint2 and joint3 are parallel, moving along them is the same`.
 ///
 /// `shares` are (axis, share in units of the prior); the words keep the order of the model.
-pub(crate) fn describe(
+pub(crate) fn describe_direction(
     shares: &[(usize, f64)],
     axes: &[Axis],
     parameters: &[Parameter],
@@ -23,7 +23,7 @@ pub(crate) fn describe(
         .map(|&(k, share)| Term::new(&parameters[axes[k].index], share * axes[k].scale))
         .collect();
     let blind = shares.iter().all(|&(k, _)| information[(k, k)] < NO_INFORMATION);
-    format!("{}: {}", combination(&terms), reason(&terms, blind))
+    format!("{}: {}", format_sum(&terms), reason(&terms, blind))
 }
 
 /// How readily a person understands that two parameters cannot be told apart.
@@ -92,7 +92,7 @@ impl<'a> Term<'a> {
 }
 
 /// The sum of the terms as written in algebra; factors only between equal units.
-fn combination(terms: &[Term<'_>]) -> String {
+fn format_sum(terms: &[Term<'_>]) -> String {
     let (boards, others): (Vec<&Term<'_>>, Vec<&Term<'_>>) = terms.iter().partition(|t| t.is_of_board());
     let followers = distinct_parts(boards.iter().copied());
     let [first, rest @ ..] = (if others.is_empty() { &boards } else { &others }).as_slice() else {
@@ -111,7 +111,7 @@ fn combination(terms: &[Term<'_>]) -> String {
     }
     // Boards have six entries each; that they follow is what matters, not by how much along each axis.
     if !others.is_empty() && !followers.is_empty() {
-        text += &format!(" with {}", list(&followers));
+        text += &format!(" with {}", join_names(&followers));
     }
     text
 }
@@ -133,7 +133,7 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
     }
     if let (true, Some(base)) = (pair_with_base, base) {
         let joint = other_than(&parts, base);
-        let base = spoken(base);
+        let base = frame_phrase(base);
         if terms.iter().all(Term::turns_about_axis) {
             return format!("turning the zero of {joint} is the same as turning {base}");
         }
@@ -142,14 +142,14 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
         }
     }
     if frames && parts.len() > 1 {
-        return format!("{} moving together leave every distance as it is", list(&parts));
+        return format!("{} moving together leave every distance as it is", join_names(&parts));
     }
     if frames && boards == 1 {
         return "its seated points lie on one line (or are too few): turning about them changes nothing"
             .to_string();
     }
     if boards > 0 {
-        let joints = list(&distinct_parts(robot.iter().copied()));
+        let joints = join_names(&distinct_parts(robot.iter().copied()));
         return if robot.iter().all(|t| t.turns_about_axis()) {
             format!(
                 "turning the zero of {joints} is the same as turning what it reaches for, and the boards are estimated"
@@ -163,25 +163,25 @@ fn reason(terms: &[Term<'_>], blind: bool) -> String {
         };
     }
     if parts.len() > 1 && terms.iter().all(|t| t.quantity == "d") {
-        return format!("the axes of {} are parallel, moving along them is the same", list(&parts));
+        return format!("the axes of {} are parallel, moving along them is the same", join_names(&parts));
     }
     if let (Some(tip), true) = (tip, parts.len() > 1) {
-        let others = list(&without(&parts, tip));
-        return format!("{others} and {} frame cannot be told apart", spoken(tip));
+        let others = join_names(&parts_without(&parts, tip));
+        return format!("{others} and {} frame cannot be told apart", frame_phrase(tip));
     }
     if let Some(tip) = tip {
-        return format!("these dwells do not show {} from enough sides", spoken(tip));
+        return format!("these dwells do not show {} from enough sides", frame_phrase(tip));
     }
     if let Some(base) = base {
-        let base_in_words = spoken(base);
-        let mut all = without(&parts, base);
+        let base_in_words = frame_phrase(base);
+        let mut all = parts_without(&parts, base);
         if all.is_empty() {
             return format!("these dwells do not tie {base_in_words} down");
         }
         all.push(&base_in_words);
-        return format!("{} move {seen} alike over these dwells", list(&all));
+        return format!("{} move {seen} alike over these dwells", join_names(&all));
     }
-    format!("{} move {seen} alike over these dwells", list(&names(terms)))
+    format!("{} move {seen} alike over these dwells", join_names(&parameter_names(terms)))
 }
 
 /// Whether a part is the frame of this name, of the only arm or (`left.base`) of one of two.
@@ -198,11 +198,11 @@ fn tip_of<'a>(parts: &[&'a str]) -> Option<&'a str> {
 }
 
 /// `the base` of the only arm, `left.base` of one of two.
-fn spoken(frame: &str) -> String {
+fn frame_phrase(frame: &str) -> String {
     if frame.contains('.') { frame.to_owned() } else { format!("the {frame}") }
 }
 
-fn names<'a>(terms: &[Term<'a>]) -> Vec<&'a str> {
+fn parameter_names<'a>(terms: &[Term<'a>]) -> Vec<&'a str> {
     terms.iter().map(|t| t.parameter.name.as_str()).collect()
 }
 
@@ -216,16 +216,16 @@ fn distinct_parts<'t, 'a: 't>(terms: impl IntoIterator<Item = &'t Term<'a>>) -> 
     parts
 }
 
-fn without<'a>(parts: &[&'a str], part: &str) -> Vec<&'a str> {
+fn parts_without<'a>(parts: &[&'a str], part: &str) -> Vec<&'a str> {
     parts.iter().copied().filter(|p| *p != part).collect()
 }
 
 fn other_than<'a>(parts: &[&'a str], part: &str) -> &'a str {
-    without(parts, part).first().copied().unwrap_or_default()
+    parts_without(parts, part).first().copied().unwrap_or_default()
 }
 
 /// `a`, `a and b`, `a, b and c`.
-fn list(names: &[&str]) -> String {
+fn join_names(names: &[&str]) -> String {
     match names {
         [] => String::new(),
         [one] => (*one).to_string(),
@@ -258,7 +258,7 @@ mod tests {
         let axis = |index| Axis { index, centre: 0.0, scale: 1.0, precision: 1.0, lower: -1.0, upper: 1.0 };
         let axes: Vec<Axis> = (0..parts.len()).map(axis).collect();
         let shares: Vec<(usize, f64)> = parts.iter().map(|p| p.1).enumerate().collect();
-        describe(&shares, &axes, &parameters, &DMatrix::identity(parts.len(), parts.len()))
+        describe_direction(&shares, &axes, &parameters, &DMatrix::identity(parts.len(), parts.len()))
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Where a fit ends, for whoever asks for its parameters alone: also with some of them held.
 
-use crate::fit::{enough_equations, solve, with_its_noise};
+use crate::fit::{enough_equations, minimise_objective, with_its_noise};
 use crate::problem::Problem;
 use crate::solver::Curvature;
 use crate::whitened::{Axis, Whitened};
@@ -35,7 +35,7 @@ pub fn fitted_values(
     let free = &|p: &Parameter| p.free;
     let white = Whitened::new(Box::new(problem), start, free, config)?;
     enough_equations(&white)?;
-    let solved = solve(&white, sigma_scale, config)?;
+    let solved = minimise_objective(&white, sigma_scale, config)?;
     let (white, solved) = with_its_noise(problem, (white, solved), free, config)?;
     let values = white.parameters_at(&solved.at.x);
     let curvature = solved.curvature.filter(|_| white.axes.len() <= MOST_AXES);

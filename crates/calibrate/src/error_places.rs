@@ -1,6 +1,6 @@
 //! In which dwells errors are largest: the place in a session that a person would look at first.
 
-use armcal_core::{DwellId, Observation, listed};
+use armcal_core::{DwellId, Observation, list_names};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -57,14 +57,14 @@ impl DwellError<'_> {
 pub fn error_places(errors: &[DwellError<'_>], joint_names: &[String]) -> Vec<ErrorPlace> {
     let log: Vec<f64> = errors.iter().map(DwellError::ln_times_noise).collect();
     let mut found: Vec<(f64, ErrorPlace)> = Vec::new();
-    for (place, members) in groups(errors, joint_names) {
+    for (place, members) in named_groups(errors, joint_names) {
         let (inside, outside): (Vec<usize>, Vec<usize>) =
             (0..errors.len()).partition(|i| members.binary_search(i).is_ok());
         if inside.len() < FEWEST || outside.len() < FEWEST {
             continue;
         }
-        let (mean_in, variance_in) = moments(&log, &inside);
-        let (mean_out, variance_out) = moments(&log, &outside);
+        let (mean_in, variance_in) = mean_and_variance(&log, &inside);
+        let (mean_out, variance_out) = mean_and_variance(&log, &outside);
         let sigma = (variance_in / inside.len() as f64 + variance_out / outside.len() as f64).sqrt();
         let sigmas = (mean_in - mean_out) / sigma.max(1e-12);
         if sigmas < SIGMAS || (mean_in - mean_out).exp() < FACTOR {
@@ -96,7 +96,7 @@ pub fn single_dwells(errors: &[DwellError<'_>], floor_factor: f64) -> Option<Err
     };
     let for_them_alone = at_floor(&outside) && !at_floor(&every);
     let names: Vec<String> = gross.iter().map(ToString::to_string).collect();
-    for_them_alone.then(|| ErrorPlace::of(listed(&names), errors, (&inside, &outside)))
+    for_them_alone.then(|| ErrorPlace::of(list_names(&names), errors, (&inside, &outside)))
 }
 
 impl ErrorPlace {
@@ -120,7 +120,7 @@ impl ErrorPlace {
 
 /// Every group of dwells that has a name: recordings, seated or tracked, halves and ends of the time, thirds of each
 /// joint's range, directions of arrival, cavities. Members in rising order.
-fn groups(errors: &[DwellError<'_>], joint_names: &[String]) -> BTreeMap<String, Vec<usize>> {
+fn named_groups(errors: &[DwellError<'_>], joint_names: &[String]) -> BTreeMap<String, Vec<usize>> {
     let mut all: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     let mut add = |name: String, i: usize| all.entry(name).or_default().push(i);
     let mut in_time: Vec<(usize, i64, DwellId)> =
@@ -128,7 +128,7 @@ fn groups(errors: &[DwellError<'_>], joint_names: &[String]) -> BTreeMap<String,
     in_time.sort_by_key(|(_, time_ns, dwell)| (*time_ns, *dwell));
     let mut rank = vec![0; errors.len()];
     in_time.iter().enumerate().for_each(|(position, (i, ..))| rank[*i] = position);
-    let ranges: Vec<(f64, f64)> = (0..joint_names.len()).map(|j| range(errors, j)).collect();
+    let ranges: Vec<(f64, f64)> = (0..joint_names.len()).map(|j| joint_range(errors, j)).collect();
     for (i, e) in errors.iter().enumerate() {
         let o = e.observation;
         add(format!("recording {}", o.dwell.recording), i);
@@ -165,13 +165,13 @@ fn groups(errors: &[DwellError<'_>], joint_names: &[String]) -> BTreeMap<String,
     all
 }
 
-fn range(errors: &[DwellError<'_>], joint: usize) -> (f64, f64) {
+fn joint_range(errors: &[DwellError<'_>], joint: usize) -> (f64, f64) {
     let readings = errors.iter().map(|e| e.observation.joint_rad[joint]);
     readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)))
 }
 
 /// Mean and variance of some values.
-fn moments(values: &[f64], of: &[usize]) -> (f64, f64) {
+fn mean_and_variance(values: &[f64], of: &[usize]) -> (f64, f64) {
     let n = of.len() as f64;
     let mean = of.iter().map(|i| values[*i]).sum::<f64>() / n;
     (mean, of.iter().map(|i| (values[*i] - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0))

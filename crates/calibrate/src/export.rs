@@ -35,7 +35,7 @@ pub fn whitened_problem<'a>(
     }
     config.check()?;
     let white = Whitened::new(Box::new(problem), &start, &|p| p.free, &config)?;
-    let sigma_scale = fit::solve(&white, None, &config)?.sigma_scale;
+    let sigma_scale = fit::minimise_objective(&white, None, &config)?.sigma_scale;
     Ok(WhitenedProblem { white, config, sigma_scale })
 }
 

@@ -5,7 +5,7 @@ use crate::model_problem::ModelProblem;
 use crate::outcome::{Estimate, Fit, PaperObjective, Status};
 use crate::priors::PriorScales;
 use crate::problem::Problem;
-use crate::remembered::{Looked, Remembered, look};
+use crate::remembered::{Looked, Remembered, evaluate_problem};
 use crate::robust::{RobustCost, median_scale, proposal2_scale};
 use crate::solver::{self, Curvature, Settings};
 use crate::statistics::{self, Uncertainty};
@@ -79,7 +79,7 @@ pub(crate) fn fit_near(
     // A derivative that stays all the way: that where the other fit ended, then that where the first one led.
     for is_renewed in [false, true] {
         if is_renewed {
-            known = Some(Arc::unwrap_or_clone(look(problem, &start, free, config)?));
+            known = Some(Arc::unwrap_or_clone(evaluate_problem(problem, &start, free, config)?));
         }
         let Some(about) = known.as_ref().and_then(|looked| Remembered::about(problem, looked)) else { break };
         let fit = fit_from(&about, (&start, &PriorScales::new()), Some(&near), free, config)?;
@@ -115,7 +115,7 @@ fn fit_from(
     // Noise that depends on what is found is found with the default priors.
     let none = PriorScales::new();
     let scales = if problem.noise_depends() { &none } else { scales };
-    let declared = Whitened::new(priors::scaled(problem, scales), start, free, config)?;
+    let declared = Whitened::new(priors::scale_priors(problem, scales), start, free, config)?;
     enough_equations(&declared)?;
     let solved = match near {
         // The first fit that counts is that with the priors which the other one learnt.
@@ -124,13 +124,13 @@ fn fit_from(
         {
             Solved::unmoved(&declared, near.sigma_scale)?
         }
-        _ => solve(&declared, near.map(|n| n.sigma_scale), config)?,
+        _ => minimise_objective(&declared, near.map(|n| n.sigma_scale), config)?,
     };
     let (declared, solved) = with_its_noise(problem, (declared, solved), free, config)?;
     let known = near.map(|n| &n.prior_scales);
-    let learnt = priors::learnt(problem, (&declared, &solved, scales), known, free, config)?;
+    let learnt = priors::fit_learnt_scales(problem, (&declared, &solved, scales), known, free, config)?;
     let of_learnt = |(white, solved): &(Whitened<'_>, Solved)| {
-        [priors::said(white), wider::said(problem, white, solved)].into_iter().flatten()
+        [priors::learnt_notice(white), wider::widened_notice(problem, white, solved)].into_iter().flatten()
     };
     let said: Vec<Warning> = learnt.iter().flat_map(of_learnt).collect();
     let values = learnt.as_ref().map(|(white, solved)| white.parameters_at(&solved.at.x));
@@ -177,7 +177,7 @@ fn fit_from(
         iterations: solved.iterations,
         warnings: Vec::new(),
     };
-    fit.warnings = fit_warnings::of(&fit, &white);
+    fit.warnings = fit_warnings::of_fit(&fit, &white);
     fit.warnings.extend(said);
     Ok(fit)
 }
@@ -196,7 +196,7 @@ pub(crate) fn with_its_noise<'a>(
     for _ in 0..NOISE_ROUNDS {
         let values = white.parameters_at(&solved.at.x);
         let again = Whitened::new(Box::new(problem), &values, free, config)?;
-        let mut better = solve(&again, Some(solved.sigma_scale), config)?;
+        let mut better = minimise_objective(&again, Some(solved.sigma_scale), config)?;
         better.iterations += solved.iterations;
         let found = again.parameters_at(&better.at.x);
         let moved = again.axes.iter().map(|a| (found[a.index] - values[a.index]).abs() / a.scale);
@@ -239,7 +239,7 @@ impl Solved {
 }
 
 /// Minimises the objective asked for; `sigma_scale` where it is known roughly.
-pub(crate) fn solve(
+pub(crate) fn minimise_objective(
     white: &Whitened<'_>,
     sigma_scale: Option<f64>,
     config: &FitConfig,

@@ -2,7 +2,7 @@
 
 use crate::outcome::{Calibration, Fit, Status};
 use crate::whitened::Whitened;
-use armcal_core::{Severity, Stage, Warning, listed};
+use armcal_core::{Severity, Stage, Warning, list_names};
 
 /// Weight below which an observation is named as an outlier.
 const OUTLIER_WEIGHT: f64 = 0.25;
@@ -20,7 +20,7 @@ pub const OUTLIERS: &str = "outliers";
 /// Share of outliers from which on they are no exceptions.
 const INADEQUATE_OUTLIERS: f64 = 0.25;
 
-pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
+pub(crate) fn of_fit(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut add = |severity, code, subject: &str, message: String| {
         warnings.push(Warning::new(severity, Stage::Calibrate, code, subject, message));
@@ -60,7 +60,7 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
     if !at_bound.is_empty() {
         let message =
             "on the bound: the true value may lie outside, or a missing effect pulls there".to_string();
-        add(Severity::Notice, "at-bound", &listed(&at_bound), message);
+        add(Severity::Notice, "at-bound", &list_names(&at_bound), message);
     }
     if fit.sigma_scale > LARGE_SCALE {
         let message = format!(
@@ -86,7 +86,7 @@ pub(crate) fn of(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         let severity = if many { Severity::Inadequate } else { Severity::Notice };
         // Several observations of one dwell have one name.
         outliers.dedup();
-        add(severity, OUTLIERS, &listed(&outliers), message);
+        add(severity, OUTLIERS, &list_names(&outliers), message);
     }
     warnings
 }

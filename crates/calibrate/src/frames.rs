@@ -1,6 +1,6 @@
 //! Frames that nobody could know: which they are, and a fit of these alone from their closed-form start.
 
-use crate::alignment::aligned;
+use crate::alignment::closed_form_start;
 use crate::model_problem::ModelProblem;
 use crate::problem::Problem;
 use crate::remembered::{self, Looked, Remembered};
@@ -21,7 +21,7 @@ pub fn align_frames(
     config: &FitConfig,
 ) -> Result<Vec<f64>, CalibrateError> {
     let problem = ModelProblem::new(model, observations, config)?;
-    Ok(aligned(&problem, config, model.nominal(), &|_| true))
+    Ok(closed_form_start(&problem, config, model.nominal(), &|_| true))
 }
 
 /// The parameter vector with only [`Role::EstimatedFrame`] parameters fitted: what the arm would do with nominal
@@ -53,14 +53,14 @@ pub(crate) fn fit_on(problem: &ModelProblem<'_>, config: &FitConfig) -> Result<V
 }
 
 /// A problem where its frames ended, as fits of them to most of its observations will ask of it; none where no frame is free.
-pub(crate) fn look(
+pub(crate) fn evaluate_frames(
     problem: &ModelProblem<'_>,
     values: &[f64],
     config: &FitConfig,
 ) -> Result<Option<Arc<Looked>>, CalibrateError> {
     let free = of_observations(problem);
     let any = problem.parameters().iter().any(&free);
-    any.then(|| remembered::look(problem, values, &free, config)).transpose()
+    any.then(|| remembered::evaluate_problem(problem, values, &free, config)).transpose()
 }
 
 /// [`fit_on`] from where the frames of more observations ended, those among them: to the same minimum, only the way is shorter.
@@ -79,10 +79,10 @@ pub(crate) fn fit_on_fewer(
     let mut sigma_scale = None;
     let looked = looked.filter(|_| !config.every_step);
     if let Some(about) = looked.and_then(|looked| Remembered::about(problem, looked)) {
-        let (near, scale) = solved(&about, (&start, None), config, &free)?;
+        let (near, scale) = solve_frames(&about, (&start, None), config, &free)?;
         (start, sigma_scale) = (near, Some(scale));
     }
-    Ok(solved(problem, (&start, sigma_scale), config, &free)?.0)
+    Ok(solve_frames(problem, (&start, sigma_scale), config, &free)?.0)
 }
 
 /// Whether a parameter places a frame that the observations of a problem say something about.
@@ -100,7 +100,7 @@ pub(crate) fn fit_some(
     which: &dyn Fn(&Parameter) -> bool,
 ) -> Result<Vec<f64>, CalibrateError> {
     let free = |p: &Parameter| is_free(p) && which(p);
-    let start = aligned(problem, config, start, &free);
+    let start = closed_form_start(problem, config, start, &free);
     if let Some(most_m) = config.give_up_above_m {
         let (mut sum_m, observations) = (0.0, problem.observations());
         let mut add = |_: &Observation, residual: ModelResidual| sum_m += residual.position_m.norm();
@@ -110,7 +110,7 @@ pub(crate) fn fit_some(
             return Err(CalibrateError::GivenUp { mean_m });
         }
     }
-    Ok(solved(problem, (&start, None), config, &free)?.0)
+    Ok(solve_frames(problem, (&start, None), config, &free)?.0)
 }
 
 pub(crate) fn is_free(p: &Parameter) -> bool {
@@ -119,7 +119,7 @@ pub(crate) fn is_free(p: &Parameter) -> bool {
 
 /// The frames `free` where the solver ends with them, the others at the start; with the scale of the residuals in units of the
 /// declared noise, which the start comes with where it is known roughly.
-fn solved(
+fn solve_frames(
     problem: &dyn Problem,
     (start, sigma_scale): (&Vec<f64>, Option<f64>),
     config: &FitConfig,
@@ -132,7 +132,7 @@ fn solved(
     let white = Whitened::new(Box::new(problem), start, free, config)?;
     // Frames are never the subject of eq. 4; they are fitted robustly under it.
     let objective = if config.objective == Objective::Paper { Objective::Robust } else { config.objective };
-    let solved = fit::solve(&white, sigma_scale, &FitConfig { objective, ..config.clone() })?;
+    let solved = fit::minimise_objective(&white, sigma_scale, &FitConfig { objective, ..config.clone() })?;
     Ok((white.parameters_at(&solved.at.x), solved.sigma_scale))
 }
 

@@ -1,6 +1,6 @@
 //! Which observations are held out, in which turns.
 
-use crate::poses::{Sets, pairs, pose_groups};
+use crate::poses::{Sets, each_pose_pair, pose_groups};
 use crate::{CalibrateError, HoldoutConfig, RecordingKey};
 use armcal_core::{DwellId, Observation, Severity, Stage, Warning};
 use std::collections::{BTreeMap, BTreeSet};
@@ -30,7 +30,7 @@ pub(crate) fn resolve(
         HoldoutConfig::Cavities { names } => once(by_cavities(names, observations)?),
         HoldoutConfig::EveryNthCavity { n, offset } => {
             if *n < 2 || offset >= n {
-                return Err(bad(
+                return Err(bad_config(
                     "holdout.n",
                     format!("{n}, offset {offset}"),
                     "n of 2 or more, offset below n",
@@ -43,12 +43,12 @@ pub(crate) fn resolve(
         HoldoutConfig::Recordings { recordings } => once(by_recordings(recordings, observations, boards)?),
         HoldoutConfig::EachRecording => holdout(of_recordings(observations), true),
         HoldoutConfig::RecordingFolds { k } => holdout(recording_folds(*k, observations)?, true),
-        HoldoutConfig::CavityFolds { k } => holdout(folds(*k, observations)?, true),
+        HoldoutConfig::CavityFolds { k } => holdout(cavity_folds(*k, observations)?, true),
         HoldoutConfig::Random { share, seed } => {
             if !(*share > 0.0 && *share < 1.0) {
-                return Err(bad("holdout.share", share.to_string(), "a number between 0 and 1"));
+                return Err(bad_config("holdout.share", share.to_string(), "a number between 0 and 1"));
             }
-            once(random(*share, *seed, observations))
+            once(random_poses(*share, *seed, observations))
         }
         HoldoutConfig::Dwells { dwells } => once(by_dwells(dwells, observations)?),
     };
@@ -70,7 +70,7 @@ fn poses_on_both_sides(turns: &[Vec<usize>], observations: &[Observation]) -> Op
         held.iter().for_each(|i| turn_of[*i] = Some(turn));
     }
     let mut seen = vec![false; observations.len()];
-    pairs(observations, |a, b| {
+    each_pose_pair(observations, |a, b| {
         if turn_of[a] != turn_of[b] {
             seen[a] |= turn_of[a].is_some();
             seen[b] |= turn_of[b].is_some();
@@ -92,7 +92,7 @@ fn with_their_poses(held: BTreeSet<usize>, observations: &[Observation]) -> BTre
     (0..observations.len()).filter(|i| poses.contains(&groups[*i])).collect()
 }
 
-fn bad(key: &'static str, value: String, why: &str) -> CalibrateError {
+fn bad_config(key: &'static str, value: String, why: &str) -> CalibrateError {
     CalibrateError::BadConfig { key, value, why: format!("give {why}") }
 }
 
@@ -100,12 +100,12 @@ fn by_cavities(names: &[String], observations: &[Observation]) -> Result<BTreeSe
     let cavities = cavities_of(observations);
     let mut held = BTreeSet::new();
     for name in names {
-        let visits = cavities.get(&natural(name)).ok_or_else(|| {
+        let visits = cavities.get(&natural_key(name)).ok_or_else(|| {
             let present = observations.iter().filter_map(Observation::cavity);
             CalibrateError::UnknownHoldout {
                 kind: "cavity",
                 name: name.clone(),
-                hint: nearest(name, present),
+                hint: nearest_hint(name, present),
             }
         })?;
         held.extend(visits);
@@ -131,7 +131,7 @@ fn by_recordings(
             let names: Vec<String> = boards.iter().map(|b| short(b)).collect();
             let hint = match key {
                 RecordingKey::Name(name) if !names.is_empty() => {
-                    nearest(name, names.iter().map(String::as_str))
+                    nearest_hint(name, names.iter().map(String::as_str))
                 }
                 _ => "; recordings without a board are named by their index in the pipeline, from 0"
                     .to_string(),
@@ -173,7 +173,7 @@ fn recording_folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usi
     let recordings = of_recordings(observations);
     if k < 2 || k > recordings.len() {
         let why = format!("a number from 2 to {}, the number of recordings", recordings.len());
-        return Err(bad("holdout.k", k.to_string(), &why));
+        return Err(bad_config("holdout.k", k.to_string(), &why));
     }
     let mut turns = vec![Vec::new(); k];
     recordings.into_iter().enumerate().for_each(|(r, own)| turns[r % k].extend(own));
@@ -183,16 +183,16 @@ fn recording_folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usi
 
 /// `k` groups of cavities, dealt out like cards in natural order, so that each group covers the whole board. Tracked dwells
 /// go by their poses, and with the cavity whose pose they share.
-fn folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, CalibrateError> {
+fn cavity_folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, CalibrateError> {
     let mut sets = Sets::new(observations.len());
     for visits in cavities_of(observations).values() {
         visits.windows(2).for_each(|pair| sets.join(pair[0], pair[1]));
     }
-    pairs(observations, |a, b| sets.join(a, b));
+    each_pose_pair(observations, |a, b| sets.join(a, b));
     let mut groups = members(&sets.numbered());
     if k < 2 || k > groups.len() {
         let why = format!("a number from 2 to {}, the number of cavities and tracked poses", groups.len());
-        return Err(bad("holdout.k", k.to_string(), &why));
+        return Err(bad_config("holdout.k", k.to_string(), &why));
     }
     // Dealt out in the order of their hashes: a round of poses repeated in the recording must not fill one turn.
     groups.sort_by_key(|group| group.first().map(|&i| dwell_hash(0, &observations[i])));
@@ -206,12 +206,12 @@ fn folds(k: usize, observations: &[Observation]) -> Result<Vec<Vec<usize>>, Cali
 
 /// A hash of seed, recording and dwell, the same on every machine.
 fn dwell_hash(seed: u64, o: &Observation) -> u64 {
-    mix(mix(mix(seed) ^ o.dwell.recording as u64) ^ o.dwell.dwell as u64)
+    mix_bits(mix_bits(mix_bits(seed) ^ o.dwell.recording as u64) ^ o.dwell.dwell as u64)
 }
 
 /// The poses with the smallest hashes of (seed, recording, dwell), by the smallest of their dwells, until there are enough
 /// dwells: adding a dwell never reshuffles the others.
-fn random(share: f64, seed: u64, observations: &[Observation]) -> BTreeSet<usize> {
+fn random_poses(share: f64, seed: u64, observations: &[Observation]) -> BTreeSet<usize> {
     let hash = |pose: &Vec<usize>| pose.iter().map(|i| dwell_hash(seed, &observations[*i])).min();
     let mut ranked = members(&pose_groups(observations));
     ranked.sort_by_key(hash);
@@ -235,7 +235,7 @@ fn members(groups: &[usize]) -> Vec<Vec<usize>> {
 }
 
 /// Finaliser of SplitMix64 (Steele, Lea and Flood 2014).
-fn mix(seed: u64) -> u64 {
+fn mix_bits(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -247,7 +247,7 @@ fn cavities_of(observations: &[Observation]) -> BTreeMap<Vec<Chunk>, Vec<usize>>
     let mut visits: BTreeMap<Vec<Chunk>, Vec<usize>> = BTreeMap::new();
     for (i, o) in observations.iter().enumerate() {
         if let Some(cavity) = o.cavity() {
-            visits.entry(natural(cavity)).or_default().push(i);
+            visits.entry(natural_key(cavity)).or_default().push(i);
         }
     }
     visits
@@ -260,7 +260,7 @@ enum Chunk {
     Letter(char),
 }
 
-fn natural(name: &str) -> Vec<Chunk> {
+fn natural_key(name: &str) -> Vec<Chunk> {
     let mut chunks = Vec::new();
     let mut digits = String::new();
     for c in name.chars().chain(['\0']) {
@@ -276,7 +276,7 @@ fn natural(name: &str) -> Vec<Chunk> {
     chunks
 }
 
-fn nearest<'a>(name: &str, present: impl Iterator<Item = &'a str>) -> String {
+fn nearest_hint<'a>(name: &str, present: impl Iterator<Item = &'a str>) -> String {
     let best = present
         .map(|p| (strsim::jaro_winkler(name, p), p))
         .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)));

@@ -6,7 +6,7 @@ use armcal_model::Model;
 use nalgebra::Vector3;
 
 /// All lengths growing by one factor about the base that is fixed: joint angles alone give shapes, not sizes.
-pub(crate) fn scale(model: &Model, p: &[f64]) -> Symmetry {
+pub(crate) fn scale_symmetry(model: &Model, p: &[f64]) -> Symmetry {
     let bases: Vec<String> = match model.chain().arms() {
         [] => vec!["base".to_owned()],
         arms => arms.iter().map(|arm| format!("{}.base", arm.name)).collect(),

@@ -92,7 +92,7 @@ pub use noise::expected_norm_m;
 pub use outcome::*;
 pub use paired::{MIN_CAVITIES, Pair, PairedDifference, grouped_ci95, independent_groups};
 pub use poses::{SAME_POSE_RAD, measured_together};
-pub use products::{gram, inner};
+pub use products::{gram, inner_product};
 pub use repeatability::repeatability_m;
 pub use sign_flips::SignFlips;
 pub use signs::Signs;

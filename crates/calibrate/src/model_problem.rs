@@ -5,7 +5,7 @@
 //! joints that rest anywhere in their gaps. Cross-covariance between position and orientation, and between the features that
 //! were measured in one dwell, enters through the encoders only: a block is all that was measured in a dwell.
 
-use crate::joined::scale;
+use crate::joined::scale_symmetry;
 use crate::poses::measured_together;
 use crate::problem::{Known, Linearised, Problem, Symmetry, Told};
 use crate::{CalibrateError, FitConfig, Objective};
@@ -27,7 +27,7 @@ pub fn position_covariance_m2(model: &Model, p: &[f64], o: &Observation) -> Matr
         column *= sigma;
     }
     let covariance = o.covariance_m2 + &jacobian * jacobian.transpose();
-    match along(model, p, o) {
+    match distance_direction(model, p, o) {
         Some(along) => along * along.transpose() * along.dot(&(covariance * along)),
         None => covariance,
     }
@@ -45,7 +45,7 @@ impl PositionNoise {
     /// Of an observation at parameters `p`; `None` where its covariance is none.
     pub fn of(model: &Model, p: &[f64], o: &Observation) -> Option<PositionNoise> {
         let covariance_m2 = position_covariance_m2(model, p, o);
-        match along(model, p, o) {
+        match distance_direction(model, p, o) {
             Some(along) => Some(PositionNoise::Along(along, along.dot(&(covariance_m2 * along)))),
             None => covariance_m2.cholesky().map(PositionNoise::Full),
         }
@@ -61,7 +61,7 @@ impl PositionNoise {
 }
 
 /// Where only the distance of an observation is known, the unit vector along it.
-fn along(model: &Model, p: &[f64], o: &Observation) -> Option<Vector3<f64>> {
+fn distance_direction(model: &Model, p: &[f64], o: &Observation) -> Option<Vector3<f64>> {
     // Of all others it is known without following the arm.
     if !o.is_scalar() {
         return None;
@@ -71,7 +71,10 @@ fn along(model: &Model, p: &[f64], o: &Observation) -> Option<Vector3<f64>> {
 
 /// The position part of a residual in units of its standard deviations, one a row and zero in rows that it does not have;
 /// `None` where its covariance is none.
-pub(crate) fn whitened(residual: &ModelResidual, covariance_m2: &Matrix3<f64>) -> Option<Vector3<f64>> {
+pub(crate) fn whiten_position(
+    residual: &ModelResidual,
+    covariance_m2: &Matrix3<f64>,
+) -> Option<Vector3<f64>> {
     if let Some(along) = residual.along {
         let variance_m2 = along.dot(&(covariance_m2 * along));
         let white = along.dot(&residual.position_m) / variance_m2.sqrt();
@@ -153,7 +156,7 @@ impl<'a> ModelProblem<'a> {
     pub(crate) fn to_metres(&self, observation: usize, p: &[f64]) -> Matrix3xX<f64> {
         let o = self.observations[observation];
         let (model, p) = self.model.in_recording(o.dwell.recording, p);
-        match along(model, &p, o) {
+        match distance_direction(model, &p, o) {
             Some(along) => Matrix3xX::from_columns(&[along]),
             None => Matrix3xX::identity(self.rows(o)),
         }
@@ -176,7 +179,7 @@ impl<'a> ModelProblem<'a> {
         let (rows, (model, p)) = (self.rows(o), self.model.in_recording(o.dwell.recording, p));
         let mut spread = DMatrix::zeros(rows, o.joint_rad.len());
         let moved = model.joint_jacobian(&p, o);
-        match along(model, &p, o) {
+        match distance_direction(model, &p, o) {
             Some(along) => spread.row_mut(0).copy_from(&(along.transpose() * moved)),
             None => spread.rows_mut(0, 3).copy_from(&moved),
         }
@@ -192,7 +195,7 @@ impl<'a> ModelProblem<'a> {
     /// Covariance of what was measured of an observation, without what the encoders add.
     fn measured(&self, o: &Observation, p: &[f64]) -> DMatrix<f64> {
         let (rows, (model, p)) = (self.rows(o), self.model.in_recording(o.dwell.recording, p));
-        if let Some(along) = along(model, &p, o) {
+        if let Some(along) = distance_direction(model, &p, o) {
             return DMatrix::from_element(1, 1, along.dot(&(o.covariance_m2 * along)));
         }
         let mut covariance = DMatrix::zeros(rows, rows);
@@ -231,7 +234,7 @@ fn turning_jacobian(model: &Model, p: &[f64], o: &Observation) -> Matrix3xX<f64>
 }
 
 /// Linearised rows one below the other.
-fn stacked(mut parts: Vec<Linearised>) -> Linearised {
+fn stack_rows(mut parts: Vec<Linearised>) -> Linearised {
     if parts.len() == 1 {
         return parts.swap_remove(0);
     }
@@ -261,7 +264,7 @@ impl Problem for ModelProblem<'_> {
     }
 
     fn name(&self, block: usize) -> String {
-        describe(self.of_block(block)[0])
+        describe_observation(self.of_block(block)[0])
     }
 
     fn joint_rad(&self, block: usize) -> &[f64] {
@@ -294,7 +297,7 @@ impl Problem for ModelProblem<'_> {
             let (model, p) = self.model.in_recording(o.dwell.recording, p);
             self.used(o, model.residual_with_jacobian(&p, o))
         };
-        stacked(self.of_block(block).iter().map(of).collect())
+        stack_rows(self.of_block(block).iter().map(of).collect())
     }
 
     fn linearised_each(&self, blocks: Range<usize>, p: &[f64], asked: &Asked<'_>, each: &mut Told<'_>) {
@@ -303,7 +306,7 @@ impl Problem for ModelProblem<'_> {
         let mut of = |o: &Observation, residual: ModelResidual, jacobian: DMatrix<f64>| {
             parts.push(self.used(o, (residual, jacobian)));
             if parts.len() == self.blocks[block].len() {
-                each(block, Cow::Owned(stacked(std::mem::take(&mut parts))));
+                each(block, Cow::Owned(stack_rows(std::mem::take(&mut parts))));
                 block += 1;
             }
         };
@@ -344,7 +347,7 @@ impl Problem for ModelProblem<'_> {
         if self.observations.iter().any(|o| o.against().is_none()) {
             return Vec::new();
         }
-        vec![scale(self.model, p)]
+        vec![scale_symmetry(self.model, p)]
     }
 
     fn known(&self) -> Vec<Known> {
@@ -362,7 +365,7 @@ impl Problem for ModelProblem<'_> {
 }
 
 /// `recording 0 dwell 12 (cavity circle03)`.
-pub(crate) fn describe(o: &Observation) -> String {
+pub(crate) fn describe_observation(o: &Observation) -> String {
     match o.cavity() {
         Some(cavity) => format!("{} (cavity {cavity})", o.dwell),
         None => o.dwell.to_string(),
@@ -370,7 +373,7 @@ pub(crate) fn describe(o: &Observation) -> String {
 }
 
 fn check_complete(o: &Observation) -> Result<(), CalibrateError> {
-    let observation = describe(o);
+    let observation = describe_observation(o);
     check_joints(o, &observation)?;
     let (what, values) = o.measured_values();
     if !values.iter().all(|v| v.is_finite()) {

@@ -25,9 +25,9 @@ pub fn expected_norm_m(covariance_m2: &Matrix3<f64>) -> f64 {
     // The polar axis along the largest variance: there the integrand is smoothest.
     variance.as_mut_slice().sort_by(f64::total_cmp);
     let mut mean = 0.0;
-    for (height, height_weight) in nodes() {
+    for (height, height_weight) in quadrature_nodes() {
         let across = 1.0 - height * height;
-        for (turn, turn_weight) in nodes() {
+        for (turn, turn_weight) in quadrature_nodes() {
             let cos2 = (turn * std::f64::consts::FRAC_PI_2).cos().powi(2);
             let square =
                 variance[2] * height * height + across * (variance[1] * cos2 + variance[0] * (1.0 - cos2));
@@ -38,7 +38,7 @@ pub fn expected_norm_m(covariance_m2: &Matrix3<f64>) -> f64 {
 }
 
 /// Sixteen nodes and weights on [0, 1]: the rule of 8 on each half.
-fn nodes() -> impl Iterator<Item = (f64, f64)> {
+fn quadrature_nodes() -> impl Iterator<Item = (f64, f64)> {
     GAUSS_LEGENDRE.into_iter().flat_map(|(x, w)| {
         [-x, x].into_iter().flat_map(move |x| [0.0, 0.5].map(|from| (from + 0.25 * (1.0 + x), 0.25 * w)))
     })

@@ -44,7 +44,7 @@ pub(crate) fn minimise(white: &Whitened<'_>, config: &FitConfig) -> Result<Paper
         iterations += 1;
         let blocks = white.distances(&x)?;
         loop {
-            let step = subproblem(white, &x, &blocks, region, iterations)?;
+            let step = solve_subproblem(white, &x, &blocks, region, iterations)?;
             let predicted = value - model_mm(&x, &blocks, &step);
             if predicted <= RELATIVE_TOLERANCE * value || region < SMALLEST_REGION {
                 status = Status::Converged;
@@ -81,7 +81,7 @@ fn model_mm(x: &DVector<f64>, blocks: &[Linearised], step: &DVector<f64>) -> f64
 }
 
 /// `min sum_j t_j + tie-breaker` over (d, t), `|r_j + J_j d| <= t_j`, d within bounds and trust region [mm].
-fn subproblem(
+fn solve_subproblem(
     white: &Whitened<'_>,
     x: &DVector<f64>,
     blocks: &[Linearised],

@@ -32,15 +32,16 @@ pub fn measured_together<O: Borrow<Observation>>(observations: &[O]) -> Vec<Rang
 /// groups are as small as that allows. Different cavities are different poses, however close.
 pub(crate) fn pose_groups(observations: &[Observation]) -> Vec<usize> {
     let mut sets = Sets::new(observations.len());
-    pairs(observations, |a, b| sets.join(a, b));
+    each_pose_pair(observations, |a, b| sets.join(a, b));
     sets.numbered()
 }
 
 /// Calls `found` with every two observations of one pose.
-pub(crate) fn pairs(observations: &[Observation], mut found: impl FnMut(usize, usize)) {
+pub(crate) fn each_pose_pair(observations: &[Observation], mut found: impl FnMut(usize, usize)) {
     // Along the joint that moves most, observations of one pose are neighbours.
     let joints = observations.iter().map(|o| o.joint_rad.len()).min().unwrap_or(0);
-    let widest = (0..joints).max_by(|a, b| spread(observations, *a).total_cmp(&spread(observations, *b)));
+    let widest =
+        (0..joints).max_by(|a, b| joint_spread(observations, *a).total_cmp(&joint_spread(observations, *b)));
     let Some(joint) = widest else { return };
     let at = |i: usize| observations[i].joint_rad[joint];
     let mut order: Vec<usize> = (0..observations.len()).collect();
@@ -51,7 +52,7 @@ pub(crate) fn pairs(observations: &[Observation], mut found: impl FnMut(usize, u
     }
 }
 
-fn spread(observations: &[Observation], joint: usize) -> f64 {
+fn joint_spread(observations: &[Observation], joint: usize) -> f64 {
     let readings = observations.iter().map(|o| o.joint_rad[joint]);
     let start = [f64::INFINITY, f64::NEG_INFINITY];
     let [low, high] = readings.fold(start, |[low, high], q| [q.min(low), q.max(high)]);

@@ -11,13 +11,13 @@
 //! one step of expectation-maximisation, `s_new^2 = s^2 sum (x_k^2 + v_k) / n`, which never overshoots. The default prior
 //! is the widest it becomes. Bounds that the arm goes beyond are [`crate::wider`]'s matter.
 
-use crate::fit::{Solved, solve};
+use crate::fit::{Solved, minimise_objective};
 use crate::outcome::Estimate;
 use crate::problem::{Problem, Told, as_beneath};
 use crate::rows::Kept;
-use crate::statistics::posterior;
+use crate::statistics::posterior_covariance;
 use crate::whitened::{Axis, Whitened};
-use crate::wider::wider;
+use crate::wider::fit_wider_bounds;
 use crate::{CalibrateError, FitConfig, Objective};
 use armcal_core::{Parameter, ParameterKind, Severity, Stage, Warning};
 use armcal_model::Asked;
@@ -73,7 +73,7 @@ pub(crate) fn scales_of<'a>(fit: impl Iterator<Item = (&'a Estimate, &'a Paramet
     fit.filter(|(e, _)| e.parameter.free).filter_map(scale).collect()
 }
 
-/// Whether [`learnt`] fits with scales that another fit learnt, whatever the fit with the default priors is.
+/// Whether [`fit_learnt_scales`] fits with scales that another fit learnt, whatever the fit with the default priors is.
 pub(crate) fn begins_with(white: &Whitened<'_>, scales: &PriorScales, config: &FitConfig) -> bool {
     !scales.is_empty() && are_learnt(white, config)
 }
@@ -84,7 +84,7 @@ fn are_learnt(white: &Whitened<'_>, config: &FitConfig) -> bool {
 }
 
 /// A problem with its priors, as far as nobody declared them, at scales of the default ones.
-pub(crate) fn scaled<'a>(problem: &'a dyn Problem, scales: &PriorScales) -> Box<dyn Problem + 'a> {
+pub(crate) fn scale_priors<'a>(problem: &'a dyn Problem, scales: &PriorScales) -> Box<dyn Problem + 'a> {
     if scales.is_empty() {
         return Box::new(problem);
     }
@@ -98,7 +98,7 @@ pub(crate) fn scaled<'a>(problem: &'a dyn Problem, scales: &PriorScales) -> Box<
 
 /// A fit with priors as narrow as the data ask for, from a fit with priors at some scales of the default ones and from the scales
 /// that a fit to nearly the same data learnt; none where all are declared.
-pub(crate) fn learnt<'a>(
+pub(crate) fn fit_learnt_scales<'a>(
     problem: &'a dyn Problem,
     (white, solved, begun): (&Whitened<'_>, &Solved, &PriorScales),
     near: Option<&PriorScales>,
@@ -115,7 +115,7 @@ pub(crate) fn learnt<'a>(
         let (white, solved) = latest.as_ref().map_or((white, solved), |(white, solved)| (white, solved));
         let next = match proposed.take() {
             Some(scales) => scales,
-            None => rescaled(if scales.is_empty() { begun } else { &scales }, white, solved)?,
+            None => update_scales(if scales.is_empty() { begun } else { &scales }, white, solved)?,
         };
         let kept = |(kind, scale): (&ParameterKind, &f64)| {
             scales.get(kind).is_some_and(|old| (scale / old - 1.0).abs() < TOLERANCE)
@@ -125,18 +125,18 @@ pub(crate) fn learnt<'a>(
         }
         scales = next;
         let start = white.parameters_at(&solved.at.x);
-        let again = Whitened::new(scaled(problem, &scales), &start, free, config)?;
-        let mut better = solve(&again, Some(solved.sigma_scale), config)?;
+        let again = Whitened::new(scale_priors(problem, &scales), &start, free, config)?;
+        let mut better = minimise_objective(&again, Some(solved.sigma_scale), config)?;
         better.iterations += solved.iterations;
         latest = Some((again, better));
     }
     let (white, solved) = latest.as_ref().map_or((white, solved), |(white, solved)| (white, solved));
-    let wider = wider(problem, (white, solved), free, config)?;
+    let wider = fit_wider_bounds(problem, (white, solved), free, config)?;
     Ok(wider.or(latest))
 }
 
 /// The scale of each kind as the fit at these scales has it.
-fn rescaled(
+fn update_scales(
     scales: &PriorScales,
     white: &Whitened<'_>,
     solved: &Solved,
@@ -144,7 +144,7 @@ fn rescaled(
     let parameters = white.problem.parameters();
     let name = |index: usize| parameters[index].name.clone();
     let data = solved.sigma_scale.powi(-2);
-    let variances = posterior(&white.squares(&solved.at), &white.axes, data, &name)?.variances();
+    let variances = posterior_covariance(&white.squares(&solved.at), &white.axes, data, &name)?.variances();
     // Of each kind: how many, those known, and squares of offsets and of standard deviations.
     let mut sums: BTreeMap<ParameterKind, [f64; 4]> = BTreeMap::new();
     for ((axis, x), variance) in white.axes.iter().zip(solved.at.x.iter()).zip(variances.iter()) {
@@ -162,7 +162,7 @@ fn rescaled(
 }
 
 /// What was learnt, in words.
-pub(crate) fn said(white: &Whitened<'_>) -> Option<Warning> {
+pub(crate) fn learnt_notice(white: &Whitened<'_>) -> Option<Warning> {
     let parameters = white.axes.iter().map(|a| &white.problem.parameters()[a.index]);
     let kinds: BTreeMap<ParameterKind, String> = parameters
         .filter_map(|p| {

@@ -9,7 +9,7 @@ const NARROW: usize = 4;
 const BLOCK: usize = 96;
 
 /// `a'b`; by the blocked product where it is large, as nalgebra's `tr_mul` takes one dot product for each entry.
-pub fn inner<A, B>(a: &Matrix<f64, Dyn, Dyn, A>, b: &Matrix<f64, Dyn, Dyn, B>) -> DMatrix<f64>
+pub fn inner_product<A, B>(a: &Matrix<f64, Dyn, Dyn, A>, b: &Matrix<f64, Dyn, Dyn, B>) -> DMatrix<f64>
 where
     A: Storage<f64, Dyn, Dyn>,
     B: Storage<f64, Dyn, Dyn>,
@@ -50,12 +50,12 @@ where
 pub fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let columns = a.ncols();
     if columns <= BLOCK {
-        return inner(a, a);
+        return inner_product(a, a);
     }
     let mut product = DMatrix::zeros(columns, columns);
     for from in (0..columns).step_by(BLOCK) {
         let width = BLOCK.min(columns - from);
-        let of_block = inner(&a.columns(from, width), &a.columns(from, columns - from));
+        let of_block = inner_product(&a.columns(from, width), &a.columns(from, columns - from));
         product.view_mut((from, from), of_block.shape()).copy_from(&of_block);
     }
     product.fill_lower_triangle_with_upper_triangle();
@@ -64,14 +64,14 @@ pub fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{BLOCK, gram, inner};
+    use super::{BLOCK, gram, inner_product};
     use nalgebra::DMatrix;
 
     #[test]
     fn a_product_with_itself_is_the_same_by_blocks() {
         for columns in [1, 5, BLOCK, BLOCK + 1, 3 * BLOCK - 2] {
             let a = DMatrix::from_fn(150, columns, |i, j| ((i * 31 + j * 17) as f64).sin());
-            let (product, whole) = (gram(&a), inner(&a, &a));
+            let (product, whole) = (gram(&a), inner_product(&a, &a));
             assert_eq!(product, product.transpose());
             assert!((product - whole).amax() < 1e-12 * 150.0, "{columns}");
         }

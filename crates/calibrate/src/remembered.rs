@@ -68,12 +68,12 @@ const MANY_BLOCKS: usize = 1_000;
 const STRAIGHT: f64 = 1e-4;
 
 /// Whether a problem has so many blocks that the derivative stays in fits without some of them.
-pub(crate) fn stays(problem: &dyn Problem) -> bool {
+pub(crate) fn keeps_derivative(problem: &dyn Problem) -> bool {
     problem.blocks() >= MANY_BLOCKS
 }
 
 /// A problem at these parameters, as fits of the parameters `free` will ask of it.
-pub(crate) fn look(
+pub(crate) fn evaluate_problem(
     problem: &dyn Problem,
     p: &[f64],
     free: &dyn Fn(&Parameter) -> bool,
@@ -99,7 +99,7 @@ impl<'a> Remembered<'a> {
             looked.blocks.iter().map(|block| block.get().cloned()).collect::<Option<_>>()?;
         let mut remembered = Remembered::new(problem, Some(looked.clone()));
         let looked = remembered.at(&looked.p);
-        let many = stays(problem) && blocks.len() == problem.blocks();
+        let many = keeps_derivative(problem) && blocks.len() == problem.blocks();
         many.then(|| {
             let kept = Kept::of(problem.known().len().max(1));
             remembered.about = Some(About { looked, blocks, kept });

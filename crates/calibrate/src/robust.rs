@@ -6,7 +6,7 @@
 use crate::loss::{Loss, chi_median};
 use crate::products::gram;
 use crate::rows::{Derivative, Rows};
-use crate::solver::{Arrow, Cost, Curvature, Quadratic, is_tall, root, root_of};
+use crate::solver::{Arrow, Cost, Curvature, Quadratic, gram_root, is_tall, root_of};
 use crate::structure::Structure;
 use crate::whitened::{Point, Whitened};
 use crate::{CalibrateError, FitConfig, Objective};
@@ -199,7 +199,7 @@ impl RobustCost<'_, '_> {
         let squares = jacobian.column_iter().map(|column| column.norm_squared());
         let squares = DVector::from_iterator(jacobian.ncols(), squares);
         self.straighten(&mut jacobian, residual, lighter);
-        let curvature = if self.white.structure.is_dense() { gram(&jacobian) } else { root(jacobian) };
+        let curvature = if self.white.structure.is_dense() { gram(&jacobian) } else { gram_root(jacobian) };
         Part { gradient, squares, curvature }
     }
 

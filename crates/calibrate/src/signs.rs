@@ -64,7 +64,7 @@ impl Signs {
                 for (place, own) in places.iter().zip(numbers.column_iter()) {
                     all.set_column(*place, &own);
                 }
-                transform(all.as_mut_slice(), numbers.nrows());
+                hadamard_transform(all.as_mut_slice(), numbers.nrows());
                 all.select_columns(functions)
             }
         }
@@ -80,7 +80,7 @@ impl Signs {
 }
 
 /// Hadamard's transform of many rows at once: column b becomes the sum of all columns x, times `(-1)^(b . x)`.
-fn transform(columns: &mut [f64], rows: usize) {
+fn hadamard_transform(columns: &mut [f64], rows: usize) {
     let mut half = rows;
     while half > 0 && half < columns.len() {
         for pair in columns.chunks_exact_mut(2 * half) {

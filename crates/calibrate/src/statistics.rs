@@ -68,14 +68,14 @@ pub(crate) fn uncertainty(
     name: &dyn Fn(usize) -> String,
 ) -> Result<Uncertainty, CalibrateError> {
     let axes = &cost.white.axes;
-    let declared = posterior(squares, axes, cost.sigma_scale.powi(2).recip(), name)?;
+    let declared = posterior_covariance(squares, axes, cost.sigma_scale.powi(2).recip(), name)?;
     let fitted = fitted_directions(&declared.variances(), axes);
     let freedom = (cost.white.rows() as f64 - fitted).max(1.0);
     let variance = residual_variance(cost, at, freedom);
-    let covariance = posterior(squares, axes, variance.recip(), name)?;
+    let covariance = posterior_covariance(squares, axes, variance.recip(), name)?;
     let variances = covariance.variances();
     let determined = variances.iter().map(|variance| variance.sqrt() < PRIOR_DECIDES).collect();
-    let undetermined = weak(squares, variance);
+    let undetermined = weak_directions(squares, variance);
     let rank = axes.len() - undetermined.iter().map(|weak| weak.basis.ncols()).sum::<usize>();
     Ok(Uncertainty { covariance, variances, t95: t95(freedom), determined, rank, undetermined })
 }
@@ -103,7 +103,7 @@ fn residual_variance(cost: &RobustCost<'_, '_>, at: &Point, freedom: f64) -> f64
 }
 
 /// `(squares * data + P)^-1`.
-pub(crate) fn posterior(
+pub(crate) fn posterior_covariance(
     squares: &Curvature,
     axes: &[Axis],
     data: f64,
@@ -117,7 +117,7 @@ pub(crate) fn posterior(
 }
 
 /// The directions that the data do not determine.
-fn weak(squares: &Curvature, variance: f64) -> Vec<Weak> {
+fn weak_directions(squares: &Curvature, variance: f64) -> Vec<Weak> {
     let information = match squares {
         Curvature::Dense(gram) => gram / variance,
         Curvature::Arrow(arrow) if arrow.structure().axis_count() <= MOST_DENSE => {
@@ -126,7 +126,7 @@ fn weak(squares: &Curvature, variance: f64) -> Vec<Weak> {
         Curvature::Arrow(arrow) => return weak_by_group(arrow, variance),
     };
     let axes = (0..information.nrows()).collect();
-    let basis = split(&information).1;
+    let basis = split_directions(&information).1;
     vec![Weak { axes, information, basis, followed: false }]
 }
 
@@ -155,13 +155,13 @@ fn weak_by_group(arrow: &Arrow, variance: f64) -> Vec<Weak> {
             let away = if above.abs() < f64::EPSILON { -f64::EPSILON } else { above };
             schur -= turned.row(k).tr_mul(&turned.row(k)) / away;
         }
-        let basis = split(&own).1;
+        let basis = split_directions(&own).1;
         if basis.ncols() > 0 {
             found.push(Weak { axes: own_axes.clone(), information: own, basis, followed: false });
         }
     }
     let information = schur + DMatrix::identity(count, count);
-    let basis = split(&information).1;
+    let basis = split_directions(&information).1;
     if basis.ncols() > 0 {
         found.push(Weak { axes: structure.shared.clone(), information, basis, followed: true });
     }
@@ -169,7 +169,7 @@ fn weak_by_group(arrow: &Arrow, variance: f64) -> Vec<Weak> {
 }
 
 /// Splits parameter space into the directions the data determine (counted) and the others (spanned).
-fn split(information: &DMatrix<f64>) -> (usize, DMatrix<f64>) {
+fn split_directions(information: &DMatrix<f64>) -> (usize, DMatrix<f64>) {
     let eigen = information.clone().symmetric_eigen();
     let mut weak: Vec<usize> =
         (0..eigen.eigenvalues.len()).filter(|&i| eigen.eigenvalues[i] <= 1.0).collect();
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn groups_count_the_weak_directions_of_the_whole() {
-        use crate::solver::root;
+        use crate::solver::gram_root;
         use crate::structure::{Group, Structure};
         use rand::RngExt as _;
         for seed in 0..40 {
@@ -204,10 +204,10 @@ mod tests {
             let triangles = (0..3).map(|_| {
                 let sizes = DVector::from_fn(6, |_, _| 10_f64.powf(rng.random_range(-2.0..2.0)));
                 let rows = DMatrix::from_fn(rng.random_range(1..9), 6, |_, _| rng.random_range(-1.0..1.0));
-                root(rows * DMatrix::from_diagonal(&sizes))
+                gram_root(rows * DMatrix::from_diagonal(&sizes))
             });
             let arrow = Arrow::new(structure.into(), triangles.collect(), DVector::zeros(10));
-            let whole = split(&arrow.dense_squares()).1.ncols();
+            let whole = split_directions(&arrow.dense_squares()).1.ncols();
             let by_group: usize = weak_by_group(&arrow, 1.0).iter().map(|weak| weak.basis.ncols()).sum();
             assert_eq!(by_group, whole, "seed {seed}");
             assert!((1..10).contains(&whole));
@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn weak_directions_are_those_below_the_prior() {
         let information = DMatrix::from_row_slice(2, 2, &[50.0, 50.0, 50.0, 50.0]);
-        let (rank, weak) = split(&information);
+        let (rank, weak) = split_directions(&information);
         assert_eq!((rank, weak.ncols()), (1, 1));
         assert!((weak[(0, 0)] + weak[(1, 0)]).abs() < 1e-12);
     }

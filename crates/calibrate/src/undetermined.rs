@@ -49,7 +49,8 @@ fn directions_of(
     let simplicity =
         |i: usize, j: usize| describe::simplicity(&parameters[axes[i].index], &parameters[axes[j].index]);
     let weak = &over.basis;
-    let (named, texts): (Vec<DVector<f64>>, Vec<&str>) = unseen(weak, axes, symmetries).into_iter().unzip();
+    let (named, texts): (Vec<DVector<f64>>, Vec<&str>) =
+        unseen_symmetries(weak, axes, symmetries).into_iter().unzip();
     let texts = texts.into_iter().map(Some).chain(std::iter::repeat(None));
     simple_basis(weak, named, &simplicity)
         .into_iter()
@@ -57,7 +58,7 @@ fn directions_of(
         .map(|(direction, text)| {
             let shares = shares_of(&direction, &over.information);
             let lead = shares.iter().map(|s| over.axes[s.0]).min().unwrap_or(usize::MAX);
-            let in_words = || describe::describe(&shares, axes, parameters, &over.information);
+            let in_words = || describe::describe_direction(&shares, axes, parameters, &over.information);
             let mut text = text.map_or_else(in_words, str::to_owned);
             if over.followed {
                 text += ", once what each recording has for itself may follow";
@@ -70,7 +71,7 @@ fn directions_of(
 }
 
 /// The symmetries that lie in the weak subspace, as unit vectors in units of the prior, independent of each other.
-fn unseen<'s>(
+fn unseen_symmetries<'s>(
     weak: &DMatrix<f64>,
     axes: &[Axis],
     symmetries: &'s [Symmetry],
@@ -84,7 +85,7 @@ fn unseen<'s>(
         if (weak.transpose() * &direction).norm_squared() < INSIDE {
             continue;
         }
-        let rest = beyond(&direction, &spanned);
+        let rest = orthogonal_part(&direction, &spanned);
         if rest.norm_squared() >= NEW {
             spanned.push(rest.normalize());
             found.push((direction, &symmetry.text));
@@ -94,7 +95,7 @@ fn unseen<'s>(
 }
 
 /// What of a direction is orthogonal to those already spanned.
-fn beyond(direction: &DVector<f64>, spanned: &[DVector<f64>]) -> DVector<f64> {
+fn orthogonal_part(direction: &DVector<f64>, spanned: &[DVector<f64>]) -> DVector<f64> {
     let mut rest = direction.clone();
     for s in spanned {
         rest.axpy(-s.dot(&rest), s, 1.0);
@@ -113,7 +114,7 @@ fn shares_of(direction: &DVector<f64>, information: &DMatrix<f64>) -> Vec<(usize
     let mut shares: Vec<(usize, f64)> =
         (0..direction.len()).filter(|&k| takes_part(k)).map(|k| (k, direction[k])).collect();
     // Ties (two equal axes) are broken by the model's order, not by rounding.
-    shares.sort_by(|a, b| ranked(b.1).cmp(&ranked(a.1)).then(a.0.cmp(&b.0)));
+    shares.sort_by(|a, b| in_millionths(b.1).cmp(&in_millionths(a.1)).then(a.0.cmp(&b.0)));
     let sign = shares.first().map_or(1.0, |s| s.1.signum());
     shares.iter_mut().for_each(|s| s.1 *= sign);
     shares
@@ -136,7 +137,7 @@ fn simple_basis(
     candidates.sort_unstable();
     let mut spanned: Vec<DVector<f64>> = Vec::new();
     for direction in &named {
-        spanned.push(beyond(direction, &spanned).normalize());
+        spanned.push(orthogonal_part(direction, &spanned).normalize());
     }
     let mut chosen = named;
     let mut single = vec![false; weak.nrows()];
@@ -148,20 +149,20 @@ fn simple_basis(
         if i != j && single[i] && single[j] {
             continue;
         }
-        let Some(direction) = inside(&projector, i, j) else { continue };
-        let rest = beyond(&direction, &spanned);
+        let Some(direction) = nearest_weak_direction(&projector, i, j) else { continue };
+        let rest = orthogonal_part(&direction, &spanned);
         if rest.norm_squared() >= NEW {
             spanned.push(rest.normalize());
             chosen.push(direction);
             single[i] |= i == j;
         }
     }
-    chosen.extend(remainder(weak, &spanned));
+    chosen.extend(remaining_directions(weak, &spanned));
     chosen
 }
 
 /// The direction of the weak subspace nearest to the span of two parameters (one, if i = j), if it is near enough.
-fn inside(projector: &DMatrix<f64>, i: usize, j: usize) -> Option<DVector<f64>> {
+fn nearest_weak_direction(projector: &DMatrix<f64>, i: usize, j: usize) -> Option<DVector<f64>> {
     if i == j {
         return Some(projector.column(i).normalize());
     }
@@ -178,7 +179,7 @@ fn inside(projector: &DMatrix<f64>, i: usize, j: usize) -> Option<DVector<f64>> 
 }
 
 /// What the chosen directions leave of the weak subspace, turned to few large shares.
-fn remainder(weak: &DMatrix<f64>, spanned: &[DVector<f64>]) -> Vec<DVector<f64>> {
+fn remaining_directions(weak: &DMatrix<f64>, spanned: &[DVector<f64>]) -> Vec<DVector<f64>> {
     if spanned.len() >= weak.ncols() {
         return Vec::new();
     }
@@ -196,7 +197,7 @@ fn remainder(weak: &DMatrix<f64>, spanned: &[DVector<f64>]) -> Vec<DVector<f64>>
 }
 
 /// Size of a share to a millionth, so that equal ones compare equal.
-fn ranked(share: f64) -> i64 {
+fn in_millionths(share: f64) -> i64 {
     (share.abs() * 1e6).round() as i64
 }
 

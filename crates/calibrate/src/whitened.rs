@@ -358,7 +358,7 @@ fn axes_and_start(
     }
     let mut axes = Vec::new();
     for (index, parameter) in problem.parameters().iter().enumerate().filter(|(_, p)| free(p)) {
-        axes.push(axis(index, parameter, start[index], config)?);
+        axes.push(solver_axis(index, parameter, start[index], config)?);
     }
     if axes.is_empty() {
         return Err(CalibrateError::NothingFree);
@@ -424,7 +424,12 @@ fn reference_size(unit: Unit) -> f64 {
     }
 }
 
-fn axis(index: usize, parameter: &Parameter, start: f64, config: &FitConfig) -> Result<Axis, CalibrateError> {
+fn solver_axis(
+    index: usize,
+    parameter: &Parameter,
+    start: f64,
+    config: &FitConfig,
+) -> Result<Axis, CalibrateError> {
     let bad = |why: String| CalibrateError::BadParameter { name: parameter.name.clone(), why };
     let Parameter { nominal, lower, upper, .. } = *parameter;
     if !nominal.is_finite() || !start.is_finite() {

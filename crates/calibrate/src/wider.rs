@@ -4,13 +4,13 @@
 //! those half as wide again the errors are as the declared noise, the arm is there. Where they are not, the bounds stay:
 //! something else is wrong, and a wider fit would hide it.
 
-use crate::fit::{Solved, solve};
+use crate::fit::{Solved, minimise_objective};
 use crate::priors::WithPriors;
 use crate::problem::Problem;
 use crate::robust::proposal2_scale;
 use crate::whitened::Whitened;
 use crate::{CalibrateError, FitConfig};
-use armcal_core::{Parameter, Severity, Stage, Warning, listed};
+use armcal_core::{Parameter, Severity, Stage, Warning, list_names};
 
 /// How much further than assumed an arm may be from nominal.
 const WIDER: f64 = 1.5;
@@ -20,7 +20,7 @@ const AS_DECLARED: f64 = 1.4;
 const CLEARLY_LESS: f64 = 0.8;
 
 /// The fit with wider bounds where it ended on assumed ones; none where it did not, or where that explains no more.
-pub(crate) fn wider<'a>(
+pub(crate) fn fit_wider_bounds<'a>(
     problem: &'a dyn Problem,
     (white, solved): (&Whitened<'_>, &Solved),
     free: &dyn Fn(&Parameter) -> bool,
@@ -40,7 +40,7 @@ pub(crate) fn wider<'a>(
         p.upper = p.nominal + WIDER * (p.upper - p.nominal);
     }
     let again = Whitened::new(Box::new(WithPriors { problem, parameters }), &values, free, config)?;
-    let mut better = solve(&again, Some(solved.sigma_scale), config)?;
+    let mut better = minimise_objective(&again, Some(solved.sigma_scale), config)?;
     better.iterations += solved.iterations;
     let scatter = |white: &Whitened<'_>, solved: &Solved| {
         proposal2_scale(&solved.cost(white, config), &solved.at, white.axes.len() as f64)
@@ -52,7 +52,11 @@ pub(crate) fn wider<'a>(
 }
 
 /// What was widened, in words.
-pub(crate) fn said(problem: &dyn Problem, white: &Whitened<'_>, solved: &Solved) -> Option<Warning> {
+pub(crate) fn widened_notice(
+    problem: &dyn Problem,
+    white: &Whitened<'_>,
+    solved: &Solved,
+) -> Option<Warning> {
     let values = white.parameters_at(&solved.at.x);
     let of = |k: usize| {
         let (assumed, used) = (&problem.parameters()[k], &white.problem.parameters()[k]);
@@ -71,7 +75,7 @@ pub(crate) fn said(problem: &dyn Problem, white: &Whitened<'_>, solved: &Solved)
     let message = format!(
         "{}: with the bounds that nobody declared the errors stay above the noise, so wider ones were taken; check the model file, \
          or declare [model.deviation] or the model's [deviation]",
-        listed(&all)
+        list_names(&all)
     );
     (!all.is_empty()).then(|| {
         Warning::new(Severity::Notice, Stage::Calibrate, "bound-widened", "bounds".to_owned(), message)

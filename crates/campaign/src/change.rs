@@ -1,7 +1,7 @@
 //! Steps, outliers and trends of a campaign's quantities, with their sizes.
 
-use crate::line::{Line, Mean, Weighed, p_value, scale, scatters, t95, weighed};
-use crate::segment::{Best, Shape, best};
+use crate::line::{Line, Mean, Weighed, bonferroni_t95, has_scatter, p_value, residual_scale, weigh_points};
+use crate::segment::{Best, Shape, best_shape};
 use crate::{Series, SeriesPoint};
 use armcal_core::Unit;
 use serde::Serialize;
@@ -55,11 +55,11 @@ pub enum ChangeKind {
 
 /// Every change of these series that chance would give with less than one percent in all of them together; by time,
 /// the surest of one moment first.
-pub fn changes(all: &[Series]) -> Vec<Change> {
+pub fn find_changes(all: &[Series]) -> Vec<Change> {
     let alpha = FALSE_ALARMS / all.len().max(1) as f64;
     let of_one = |series: &Series| {
         let mut found = Found::default();
-        found.search(weighed(&series.points), true, alpha);
+        found.search(weigh_points(&series.points), true, alpha);
         found.prune(alpha);
         let changes = found.changes(series, all.len() as f64);
         changes.into_iter().map(|c| (time_ns(series, &c), c)).collect::<Vec<_>>()
@@ -111,8 +111,8 @@ impl Known {
         freedom: usize,
     ) -> Known {
         let rounding = points.any(|p| p.finest_is_rounding);
-        let scatters = freedom > 0 && (scatters(squares, freedom) || !rounding);
-        Known { sigma: unit * scale(squares, freedom), freedom, scatters }
+        let scatters = freedom > 0 && (has_scatter(squares, freedom) || !rounding);
+        Known { sigma: unit * residual_scale(squares, freedom), freedom, scatters }
     }
 }
 
@@ -122,7 +122,7 @@ impl Found {
     fn search(&mut self, mut points: Vec<Weighed>, trends: bool, alpha: f64) {
         let n = points.len() as f64;
         let share = |part: &[Weighed]| alpha * part.len() as f64 / n;
-        let Some(Best { shape, p, tries }) = best(&points, trends, alpha) else {
+        let Some(Best { shape, p, tries }) = best_shape(&points, trends, alpha) else {
             return self.stretches.push(points);
         };
         let p = Chance { p, tries };
@@ -176,7 +176,7 @@ impl Found {
     /// What was found, each with its interval; `series_tried` is how many series were looked at.
     fn changes(&self, series: &Series, series_tried: f64) -> Vec<Change> {
         let change = |kind, size: f64, known: Known, chance: Chance| {
-            let half = known.sigma * t95(known.freedom, chance.tries as f64 * series_tried);
+            let half = known.sigma * bonferroni_t95(known.freedom, chance.tries as f64 * series_tried);
             Change {
                 quantity: series.quantity.clone(),
                 unit: series.unit,

@@ -10,9 +10,9 @@ mod row;
 mod segment;
 mod series;
 
-pub use change::{Change, ChangeKind, changes};
+pub use change::{Change, ChangeKind, find_changes};
 pub use row::{ErrorFigures, Quantity, Row, Status};
-pub use series::{Series, SeriesPoint, series};
+pub use series::{Series, SeriesPoint, quantity_series};
 
 #[cfg(test)]
 mod tests;

@@ -29,7 +29,7 @@ pub(crate) struct Weighed {
 ///
 /// Where most recordings agree to the last digit (values at a bound, say), they do not scatter like measurements; then a
 /// difference is held against their own standard errors, where these are known.
-pub(crate) fn weighed(points: &[SeriesPoint]) -> Vec<Weighed> {
+pub(crate) fn weigh_points(points: &[SeriesPoint]) -> Vec<Weighed> {
     let start_ns = points.first().map_or(0, |p| p.time_ns);
     // Median of a chi-square variable with one degree of freedom.
     const CHI2_MEDIAN: f64 = 0.454_936;
@@ -85,7 +85,7 @@ impl Mean {
 
     /// How far `other` lies above this one in standard errors, both scattering about their own means alike.
     pub fn t_of(&self, other: &Mean, freedom: usize) -> f64 {
-        let scatter = scale(self.squares + other.squares, freedom);
+        let scatter = residual_scale(self.squares + other.squares, freedom);
         (other.value - self.value) / ((1.0 / self.weight + 1.0 / other.weight).sqrt() * scatter)
     }
 }
@@ -124,7 +124,7 @@ impl Line {
 }
 
 /// Factor by which residuals exceed what the weights promise, which is the finest difference that means anything.
-pub(crate) fn scale(squares: f64, freedom: usize) -> f64 {
+pub(crate) fn residual_scale(squares: f64, freedom: usize) -> f64 {
     (squares / freedom.max(1) as f64).max(1.0).sqrt()
 }
 
@@ -137,13 +137,13 @@ pub(crate) fn p_value(t: f64, freedom: usize) -> f64 {
 }
 
 /// Whether residuals say how much the recordings scatter: equal values do not.
-pub(crate) fn scatters(squares: f64, freedom: usize) -> bool {
+pub(crate) fn has_scatter(squares: f64, freedom: usize) -> bool {
     freedom > 0 && squares > freedom as f64
 }
 
 /// Half width in standard errors of 95 % intervals that hold for all of `tries` at once (Bonferroni): what was chosen from
 /// many because it stood out has its scatter underestimated more often than one in twenty times.
-pub(crate) fn t95(freedom: usize, tries: f64) -> f64 {
+pub(crate) fn bonferroni_t95(freedom: usize, tries: f64) -> f64 {
     let upper = 1.0 - 0.025 / tries.max(1.0);
     StudentsT::new(0.0, 1.0, freedom.max(1) as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(upper))
 }

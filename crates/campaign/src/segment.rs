@@ -1,6 +1,6 @@
 //! The best single explanation of a stretch: nothing, a step, one outlier, an episode, or a trend.
 
-use crate::line::{Line, Mean, Weighed, p_value, scale};
+use crate::line::{Line, Mean, Weighed, p_value, residual_scale};
 
 /// Shortest stretch that is judged: below, every scatter is possible.
 const SHORTEST: usize = 4;
@@ -38,13 +38,13 @@ struct Candidate {
 ///
 /// Shapes that pass are compared by the Bayesian information criterion (Schwarz 1978). Steps, outliers and episodes are tried
 /// everywhere, which Bonferroni's inequality pays for.
-pub(crate) fn best(points: &[Weighed], trends: bool, alpha: f64) -> Option<Best> {
+pub(crate) fn best_shape(points: &[Weighed], trends: bool, alpha: f64) -> Option<Best> {
     let n = points.len();
     if n < SHORTEST {
         return None;
     }
-    let trend = if trends { trend(points) } else { None };
-    let candidates = [step(points), outlier(points), episode(points), trend];
+    let trend = if trends { trend_candidate(points) } else { None };
+    let candidates = [step_candidate(points), outlier_candidate(points), episode_candidate(points), trend];
     let criterion = |c: &Candidate| {
         n as f64 * (c.squares / n as f64).max(f64::MIN_POSITIVE).ln() + c.numbers * (n as f64).ln()
     };
@@ -53,24 +53,24 @@ pub(crate) fn best(points: &[Weighed], trends: bool, alpha: f64) -> Option<Best>
 }
 
 /// The split with the largest two-sample t.
-fn step(points: &[Weighed]) -> Option<Candidate> {
+fn step_candidate(points: &[Weighed]) -> Option<Candidate> {
     let n = points.len();
     let [upto, from] = partial_means(points);
     let split = |k: usize| (Shape::Step(k), upto[k], from[k]);
-    largest((1..n).map(split), n - 1, n - 2, 3.0)
+    largest_t_candidate((1..n).map(split), n - 1, n - 2, 3.0)
 }
 
 /// The inner point that is furthest from all others; the ends are steps of which one side is short.
-fn outlier(points: &[Weighed]) -> Option<Candidate> {
+fn outlier_candidate(points: &[Weighed]) -> Option<Candidate> {
     let n = points.len();
     let [upto, from] = partial_means(points);
     let alone = |k: usize| (Shape::Outlier(k), upto[k].with(from[k + 1]), Mean::of(&points[k..=k]));
-    largest((1..n - 1).map(alone), n - 2, n - 2, 3.0)
+    largest_t_candidate((1..n - 1).map(alone), n - 2, n - 2, 3.0)
 }
 
 /// The inner stretch whose mean differs most from that of all others (circular binary segmentation, Olshen et al.
 /// 2004, Biostatistics 5:557): what is bumped and put right again hides from a single step.
-fn episode(points: &[Weighed]) -> Option<Candidate> {
+fn episode_candidate(points: &[Weighed]) -> Option<Candidate> {
     let n = points.len();
     let [upto, from] = partial_means(points);
     let during = |i: usize| {
@@ -85,7 +85,7 @@ fn episode(points: &[Weighed]) -> Option<Candidate> {
     };
     let judged = (1..n - 1).flat_map(during);
     let judged = judged.map(|(i, j, inner)| (Shape::Episode(i, j), upto[i].with(from[j]), inner));
-    largest(judged, n * n / 2, n - 2, 4.0)
+    largest_t_candidate(judged, n * n / 2, n - 2, 4.0)
 }
 
 /// Means of the points before each place, and from it on.
@@ -103,7 +103,7 @@ fn partial_means(points: &[Weighed]) -> [Vec<Mean>; 2] {
 }
 
 /// The candidate with the largest t between its two groups.
-fn largest(
+fn largest_t_candidate(
     judged: impl Iterator<Item = (Shape, Mean, Mean)>,
     tries: usize,
     freedom: usize,
@@ -116,10 +116,10 @@ fn largest(
     Some(Candidate { found: Best { shape, p, tries }, squares, numbers })
 }
 
-fn trend(points: &[Weighed]) -> Option<Candidate> {
+fn trend_candidate(points: &[Weighed]) -> Option<Candidate> {
     let n = points.len();
     let line = Line::through(points)?;
-    let t = line.per_day / (line.sigma_per_day * scale(line.squares, n - 2));
+    let t = line.per_day / (line.sigma_per_day * residual_scale(line.squares, n - 2));
     let found = Best { shape: Shape::Trend, p: p_value(t, n - 2), tries: 1 };
     Some(Candidate { found, squares: line.squares, numbers: 2.0 })
 }

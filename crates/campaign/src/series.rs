@@ -31,7 +31,7 @@ pub struct SeriesPoint {
 
 /// The quantities that at least one recording determines, in the order in which the rows name them; values that a
 /// recording does not determine are left out, and so are rows that do not count.
-pub fn series(rows: &[Row], counts: impl Fn(usize) -> bool) -> Vec<Series> {
+pub fn quantity_series(rows: &[Row], counts: impl Fn(usize) -> bool) -> Vec<Series> {
     let mut order: BTreeMap<&str, usize> = BTreeMap::new();
     let mut found: Vec<Series> = Vec::new();
     for (row, of) in rows.iter().enumerate().filter(|(row, _)| counts(*row)) {

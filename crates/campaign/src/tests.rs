@@ -34,7 +34,7 @@ fn campaigns_without_a_change_rarely_show_one() {
         let n = rng.random_range(4..60);
         let noise = [[1e-4, 0.0], [1e-4, 3e-4], [0.0, 1e-4]][seed as usize % 3];
         let all: Vec<Series> = (0..12).map(|_| recorded(n, noise, |_| 0.3, &mut rng)).collect();
-        alarms += usize::from(!changes(&all).is_empty());
+        alarms += usize::from(!find_changes(&all).is_empty());
     }
     // 1 % of 400 is promised; 12 or more would happen once in a thousand.
     assert!(alarms <= 11, "{alarms} of 400 campaigns");
@@ -47,7 +47,7 @@ fn a_step_is_found_between_its_recordings_with_its_size() {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
         let at = rng.random_range(3..27);
         let all = [recorded(30, [1e-4, 1e-4], |k| if k < at { 0.1 } else { 0.101 }, &mut rng)];
-        let found = changes(&all);
+        let found = find_changes(&all);
         more += found.len() - 1;
         let surest = found.iter().min_by(|a, b| a.p.total_cmp(&b.p)).expect("a change");
         let ChangeKind::Step { before, after } = surest.kind else { panic!("{found:?}") };
@@ -66,21 +66,21 @@ fn an_error_that_all_recordings_share_hides_no_step() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let mut series = recorded(20, [1e-4, 0.0], |k| if k < 12 { 0.0 } else { 1e-3 }, &mut rng);
     series.points.iter_mut().for_each(|p| p.sigma = Some(5e-2));
-    assert_eq!(changes(&[series])[0].kind, ChangeKind::Step { before: 8, after: 7 });
+    assert_eq!(find_changes(&[series])[0].kind, ChangeKind::Step { before: 8, after: 7 });
 }
 
 #[test]
 fn a_step_before_the_last_recording_is_seen_at_once() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let all = [recorded(20, [1e-4, 0.0], |k| if k < 19 { 0.0 } else { 2e-3 }, &mut rng)];
-    assert_eq!(changes(&all)[0].kind, ChangeKind::Step { before: 1, after: 0 });
+    assert_eq!(find_changes(&all)[0].kind, ChangeKind::Step { before: 1, after: 0 });
 }
 
 #[test]
 fn bumped_and_put_right_again() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let all = [recorded(40, [1e-4, 0.0], |k| if (12..25).contains(&k) { 1e-3 } else { 0.0 }, &mut rng)];
-    let found = changes(&all);
+    let found = find_changes(&all);
     let sizes: Vec<bool> = found.iter().map(|c| c.size > 0.0).collect();
     assert_eq!(sizes, [true, false], "{found:?}");
     assert_eq!(found[0].kind, ChangeKind::Step { before: 28, after: 27 });
@@ -93,7 +93,7 @@ fn the_last_of_several_after_a_step_is_no_second_step() {
     for seed in 0..200 {
         let mut rng = ChaCha8Rng::seed_from_u64(5000 + seed);
         let all = [recorded(13, [1e-4, 1e-4], |k| if k < 9 { 0.0 } else { 1.5e-3 }, &mut rng)];
-        let found = changes(&all);
+        let found = find_changes(&all);
         assert!(!found.is_empty());
         more += usize::from(found.len() > 1);
     }
@@ -105,7 +105,7 @@ fn the_last_of_several_after_a_step_is_no_second_step() {
 fn one_bad_recording_is_no_step() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let all = [recorded(25, [1e-4, 5e-5], |k| if k == 10 { 3e-3 } else { 0.0 }, &mut rng)];
-    let found = changes(&all);
+    let found = find_changes(&all);
     assert_eq!(found.len(), 1, "{found:?}");
     assert_eq!(found[0].kind, ChangeKind::Outlier { at: 14 });
     assert!((found[0].size - 3e-3).abs() < 5e-4);
@@ -117,7 +117,7 @@ fn wear_is_a_trend_with_its_rate() {
     for seed in 0..100 {
         let mut rng = ChaCha8Rng::seed_from_u64(3000 + seed);
         let all = [recorded(30, [1e-4, 1e-4], |k| 5e-5 * k as f64, &mut rng)];
-        let found = changes(&all);
+        let found = find_changes(&all);
         assert_eq!(found.len(), 1, "{found:?}");
         assert_eq!(found[0].kind, ChangeKind::Trend { from: 29, to: 0 });
         let [low, high] = found[0].ci95.expect("an interval");
@@ -129,12 +129,12 @@ fn wear_is_a_trend_with_its_rate() {
 #[test]
 fn three_recordings_and_equal_values_say_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
-    assert!(changes(&[recorded(3, [1e-4, 0.0], |k| k as f64, &mut rng)]).is_empty());
-    assert!(changes(&[recorded(30, [0.0, 0.0], |_| 0.2, &mut rng)]).is_empty());
-    assert!(changes(&[recorded(30, [0.0, 1e-13], |_| 0.2, &mut rng)]).is_empty());
+    assert!(find_changes(&[recorded(3, [1e-4, 0.0], |k| k as f64, &mut rng)]).is_empty());
+    assert!(find_changes(&[recorded(30, [0.0, 0.0], |_| 0.2, &mut rng)]).is_empty());
+    assert!(find_changes(&[recorded(30, [0.0, 1e-13], |_| 0.2, &mut rng)]).is_empty());
     let at_once = (0..9).map(|row| SeriesPoint { row, time_ns: 5, value: row as f64, sigma: None }).collect();
     let all = [Series { quantity: "x".into(), unit: Unit::Metre, points: at_once }];
-    assert!(changes(&all).iter().all(|c| !matches!(c.kind, ChangeKind::Trend { .. })));
+    assert!(find_changes(&all).iter().all(|c| !matches!(c.kind, ChangeKind::Trend { .. })));
 }
 
 /// A series of these values a week apart, the first recording in the first row.
@@ -152,15 +152,15 @@ fn of_values(values: &[f64], sigma: Option<f64>) -> Series {
 #[test]
 fn values_that_are_all_alike_do_not_say_how_much_they_scatter() {
     let stuck = [0.01, 0.01, 0.01, 0.03, 0.03, 0.03];
-    let found = changes(&[of_values(&stuck, None)]);
+    let found = find_changes(&[of_values(&stuck, None)]);
     assert_eq!(found.iter().map(|c| c.ci95).collect::<Vec<_>>(), [None], "{found:?}");
     // What each recording knows of itself is then all that is known.
-    let found = changes(&[of_values(&stuck, Some(1e-4))]);
+    let found = find_changes(&[of_values(&stuck, Some(1e-4))]);
     let [low, high] = found[0].ci95.expect("an interval");
     let sigma = 1e-4 * (2.0_f64 / 3.0).sqrt();
     assert!(0.5 * (high - low) > 2.77 * sigma, "{low} to {high}");
     // Six values that differ by less than they are known to: no change.
-    assert!(changes(&[of_values(&stuck, Some(0.1))]).is_empty());
+    assert!(find_changes(&[of_values(&stuck, Some(0.1))]).is_empty());
 }
 
 /// The size of a step that was picked out of many series because it stood out lies in its interval as often as promised,
@@ -177,7 +177,7 @@ fn intervals_of_steps_between_few_recordings_hold_what_they_promise() {
         let truth = |series: usize| move |k: usize| if series == 0 && k >= at { size } else { 0.0 };
         let many: Vec<Series> = (0..12).map(|i| recorded(n, [0.0, 1e-4], truth(i), &mut rng)).collect();
         let right = ChangeKind::Step { before: n - at, after: n - 1 - at };
-        for change in changes(&many).iter().filter(|c| c.kind == right) {
+        for change in find_changes(&many).iter().filter(|c| c.kind == right) {
             let [low, high] = change.ci95.expect("an interval");
             all += 1;
             inside += usize::from(low < size && size < high);

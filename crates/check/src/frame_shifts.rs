@@ -8,7 +8,7 @@ use super::measured::Check;
 use super::reasons;
 use super::reference::{Calibrated, FittedFrame};
 use armcal_core::Pose;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_result::Run;
 
 /// A frame in both results.
@@ -67,7 +67,7 @@ pub fn frame_shifts(run: &Run, now: &Calibrated, limits: &Limits) -> Vec<Check> 
             let measured = (!shifts.frames.is_empty()).then_some(largest);
             let moved: Vec<&Shift> = shifts.judged().filter(|s| real(s) > limit).collect();
             let check = Check::at_most(name, measured, limit, unit);
-            Some(check.saying(shifts.said(&moved), || shifts.causes(&moved, reasons::healthy(run))))
+            Some(check.saying(shifts.said(&moved), || shifts.causes(&moved, reasons::is_model_adequate(run))))
         })
         .collect()
 }
@@ -81,10 +81,11 @@ impl Shifts {
             // Where the boards are, seen from the base.
             let seen = |f: FittedFrame, base: Pose| FittedFrame { pose: base.inverse() * f.pose, ..f };
             let mut boards = now.frame_names().filter(|n| is_board(n)).filter_map(both).peekable();
-            moved(base, limits)
+            exceeds_limits(base, limits)
                 && boards.peek().is_some()
-                && boards
-                    .all(|(a, b)| !moved(&Shift::of("", seen(a, then.pose), seen(b, now_base.pose)), limits))
+                && boards.all(|(a, b)| {
+                    !exceeds_limits(&Shift::of("", seen(a, then.pose), seen(b, now_base.pose)), limits)
+                })
         });
         Shifts { frames, common: common.map(|(_, base)| base) }
     }
@@ -104,11 +105,11 @@ impl Shifts {
             ([], Some(common)) => format!(
                 "base and boards moved as one by {}: the sensor's frame is another (cameras calibrated anew), the rig stands \
                  as it stood",
-                amount(common)
+                shift_text(common)
             ),
             ([], None) => format!("none of {n} frames (base, tip, boards) moved by more than is allowed or explained"),
             (moved, _) => {
-                let names: Vec<String> = moved.iter().map(|s| printable(&s.name)).collect();
+                let names: Vec<String> = moved.iter().map(|s| printable_name(&s.name)).collect();
                 format!("{} of {n} frames moved: {}", moved.len(), names.join(", "))
             }
         }
@@ -135,7 +136,12 @@ impl Shifts {
         moved
             .iter()
             .map(|s| {
-                printable(&format!("`{}` moved by {} since the reference. {}", s.name, amount(s), cause(s)))
+                printable_name(&format!(
+                    "`{}` moved by {} since the reference. {}",
+                    s.name,
+                    shift_text(s),
+                    cause(s)
+                ))
             })
             .collect()
     }
@@ -145,12 +151,12 @@ fn is_board(name: &str) -> bool {
     name.starts_with("board.")
 }
 
-fn amount(shift: &Shift) -> String {
+fn shift_text(shift: &Shift) -> String {
     format!("{:.2} mm and {:.3} deg", shift.by_m * 1e3, shift.by_rad.to_degrees())
 }
 
 /// Whether a frame moved by more than a limit that is given.
-fn moved(shift: &Shift, limits: &Limits) -> bool {
+fn exceeds_limits(shift: &Shift, limits: &Limits) -> bool {
     let [by_m, by_rad] = shift.real(limits.shift_sigmas);
     let beyond = |by: f64, limit: Option<f64>| limit.is_some_and(|limit| by > limit);
     beyond(by_m * 1e3, limits.section.max_frame_shift_mm)

@@ -7,7 +7,7 @@ use super::reference::Calibrated;
 use super::{frame_shifts, shifts, verdict};
 use crate::error::CheckError;
 use armcal_core::Severity;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_diagnose::Verdict;
 use armcal_result::{Run, VERSION};
 use serde::Serialize;
@@ -46,35 +46,35 @@ pub enum Judgement {
 
 /// Judges a diagnosed run.
 pub fn judge(run: &Run, limits: &Limits) -> Result<Judged, CheckError> {
-    let mut checks = numbers::errors(run, limits);
-    checks.extend(numbers::dwells(run, limits));
-    checks.extend(verdict::verdict(run, limits));
-    checks.extend(numbers::warnings(run, limits));
+    let mut checks = numbers::check_errors(run, limits);
+    checks.extend(numbers::check_dwells(run, limits));
+    checks.extend(verdict::check_verdict(run, limits));
+    checks.extend(numbers::check_warnings(run, limits));
     if limits.reference.is_some() {
         let now = Calibrated::of(run)?;
-        checks.extend(shifts::shifts(run, &now, limits));
+        checks.extend(shifts::check_parameter_shifts(run, &now, limits));
         checks.extend(frame_shifts::frame_shifts(run, &now, limits));
     }
-    let doubts = doubts(run, limits);
+    let doubts = unlimited_warnings(run, limits);
     let judgement = match (checks.iter().all(|c| c.holds), doubts.is_empty()) {
         (false, _) => Judgement::LimitExceeded,
         (true, false) => Judgement::CompletedWithWarnings,
         (true, true) => Judgement::Holds,
     };
-    let line = line(run, &checks, &doubts);
+    let line = summary_line(run, &checks, &doubts);
     let pipeline = run.pipeline_name.clone();
     Ok(Judged { schema: SCHEMA, version: VERSION, pipeline, judgement, line, checks, doubts })
 }
 
 /// A limit on the number of warnings of a severity says how many are accepted; only the others are doubts.
-fn doubts(run: &Run, limits: &Limits) -> Vec<String> {
+fn unlimited_warnings(run: &Run, limits: &Limits) -> Vec<String> {
     let most = limits.section.max_warnings.unwrap_or_default();
     let doubtful = |w: &Told| w.severity > Severity::Notice && most.of(w.severity).is_none();
     all_warnings(run).into_iter().filter(doubtful).map(|w| w.text).collect()
 }
 
 /// `paper: 7 of 7 checks hold; held out 0.13 mm (floor 0.13), nothing missing`.
-fn line(run: &Run, checks: &[Check], doubts: &[String]) -> String {
+fn summary_line(run: &Run, checks: &[Check], doubts: &[String]) -> String {
     let held = checks.iter().filter(|c| c.holds).count();
     let broken: Vec<&str> = checks.iter().filter(|c| !c.holds).map(|c| c.name.as_str()).collect();
     let broken = if broken.is_empty() { String::new() } else { format!(", broken: {}", broken.join(", ")) };
@@ -89,8 +89,8 @@ fn line(run: &Run, checks: &[Check], doubts: &[String]) -> String {
         1 => "; 1 warning makes it doubtful".to_owned(),
         n => format!("; {n} warnings make it doubtful"),
     };
-    let missing = missing(run, held == checks.len());
-    printable(&format!(
+    let missing = missing_effects_text(run, held == checks.len());
+    printable_name(&format!(
         "{}: {held} of {} checks hold{broken}; {error}, {missing}{doubts}",
         run.pipeline_name,
         checks.len()
@@ -98,7 +98,7 @@ fn line(run: &Run, checks: &[Check], doubts: &[String]) -> String {
 }
 
 /// What the diagnosis says. Beside a broken limit `nothing missing` would read as a contradiction: it is about effects.
-fn missing(run: &Run, all_hold: bool) -> String {
+fn missing_effects_text(run: &Run, all_hold: bool) -> String {
     match &run.diagnosis {
         None => {
             run.setup.mistakes().next().map_or("not diagnosed".to_owned(), |f| format!("setup: {}", f.code))

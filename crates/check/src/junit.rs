@@ -11,13 +11,13 @@ use quick_xml::{Reader, Writer};
 
 /// Every check a case; a broken one fails with its sentence, and its causes in the body.
 pub fn junit(judged: &Judged) -> Result<String, CheckError> {
-    let mut suite = suite(&judged.pipeline);
+    let mut suite = new_suite(&judged.pipeline);
     suite.add_property(Property::new("armcal.line", judged.line.as_str()));
-    suite.add_test_cases(judged.checks.iter().map(|check| case(&judged.pipeline, check)));
+    suite.add_test_cases(judged.checks.iter().map(|check| test_case(&judged.pipeline, check)));
     if !judged.doubts.is_empty() {
         suite.set_system_err(judged.doubts.join("\n"));
     }
-    written(suite)
+    suite_xml(suite)
 }
 
 /// A run that did not come to its checks: one case in error.
@@ -25,19 +25,19 @@ pub fn junit_failed(pipeline: &str, error: &str) -> Result<String, CheckError> {
     let mut status = TestCaseStatus::non_success(NonSuccessKind::Error);
     status.set_message(error).set_type("armcal.failed").set_description(error);
     let mut case = TestCase::new("run", status);
-    case.set_classname(class(pipeline));
-    let mut suite = suite(pipeline);
+    case.set_classname(class_name(pipeline));
+    let mut suite = new_suite(pipeline);
     suite.add_test_case(case);
-    written(suite)
+    suite_xml(suite)
 }
 
-fn suite(pipeline: &str) -> TestSuite {
+fn new_suite(pipeline: &str) -> TestSuite {
     let mut suite = TestSuite::new(pipeline);
     suite.add_property(Property::new("armcal.version", VERSION));
     suite
 }
 
-fn case(pipeline: &str, check: &Check) -> TestCase {
+fn test_case(pipeline: &str, check: &Check) -> TestCase {
     let status = if check.holds {
         TestCaseStatus::success()
     } else {
@@ -50,29 +50,29 @@ fn case(pipeline: &str, check: &Check) -> TestCase {
         status
     };
     let mut case = TestCase::new(check.name.as_str(), status);
-    case.set_classname(class(pipeline));
+    case.set_classname(class_name(pipeline));
     if check.holds {
         case.set_system_out(check.said.as_str());
     }
     case
 }
 
-fn class(pipeline: &str) -> String {
+fn class_name(pipeline: &str) -> String {
     format!("armcal.{pipeline}")
 }
 
-fn written(suite: TestSuite) -> Result<String, CheckError> {
+fn suite_xml(suite: TestSuite) -> Result<String, CheckError> {
     let mut report = Report::new("armcal check");
     report.add_test_suite(suite);
     let xml = report.to_string().map_err(|e| CheckError::Junit(Box::new(e)))?;
     // The library drops control characters; these two are no characters of XML either.
     let xml = xml.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
-    valid(&xml).map_err(|e| CheckError::Junit(Box::new(e)))
+    drop_skipped_count(&xml).map_err(|e| CheckError::Junit(Box::new(e)))
 }
 
 /// Without the `skipped` count of the root: the schema of Jenkins knows it of a suite only, and its xUnit plugin refuses
 /// the file.
-fn valid(xml: &str) -> Result<String, std::io::Error> {
+fn drop_skipped_count(xml: &str) -> Result<String, std::io::Error> {
     let mut reader = Reader::from_str(xml);
     let mut writer = Writer::new(Vec::new());
     loop {

@@ -10,14 +10,14 @@ pub fn markdown(judged: &Judged) -> String {
         Judgement::CompletedWithWarnings => "⚠️",
         Judgement::LimitExceeded => "❌",
     };
-    let mut page = format!("### {mark} {}\n\n", plain(&judged.line));
+    let mut page = format!("### {mark} {}\n\n", escape_markdown(&judged.line));
     page.push_str("| check | measured | limit | |\n|---|--:|--:|---|\n");
     for check in &judged.checks {
         page.push_str(&format!(
             "| {} | {} | {} | {} |\n",
-            plain(&check.name),
-            plain(&check.measured_text()),
-            plain(&check.limit_text()),
+            escape_markdown(&check.name),
+            escape_markdown(&check.measured_text()),
+            escape_markdown(&check.limit_text()),
             if check.holds { "holds" } else { "**broken**" }
         ));
     }
@@ -26,23 +26,29 @@ pub fn markdown(judged: &Judged) -> String {
         page.push_str("\n#### Why\n\n");
     }
     for (checks, sentences) in causes {
-        page.push_str(&format!("- {}\n", plain(&checks)));
-        page.push_str(&sentences.iter().map(|s| format!("  - {}\n", plain(s))).collect::<String>());
+        page.push_str(&format!("- {}\n", escape_markdown(&checks)));
+        page.push_str(&sentences.iter().map(|s| format!("  - {}\n", escape_markdown(s))).collect::<String>());
     }
     if !judged.doubts.is_empty() {
         page.push_str("\n#### What makes it doubtful\n\n");
-        page.push_str(&judged.doubts.iter().map(|d| format!("- {}\n", plain(d))).collect::<String>());
+        page.push_str(
+            &judged.doubts.iter().map(|d| format!("- {}\n", escape_markdown(d))).collect::<String>(),
+        );
     }
     page
 }
 
 /// A run that did not come to its checks.
 pub fn markdown_failed(pipeline: &str, error: &str) -> String {
-    format!("### ❌ {}: no check was made, the run failed\n\n{}\n", plain(pipeline), plain(error))
+    format!(
+        "### ❌ {}: no check was made, the run failed\n\n{}\n",
+        escape_markdown(pipeline),
+        escape_markdown(error)
+    )
 }
 
 /// Words that are not markup, on one line: names come from recordings.
-fn plain(text: &str) -> String {
+fn escape_markdown(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -63,11 +69,11 @@ fn plain(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::plain;
+    use super::escape_markdown;
 
     #[test]
     fn names_are_no_markup() {
-        assert_eq!(plain("a|b\n<img src=x>"), "a\\|b &lt;img src=x&gt;");
-        assert_eq!(plain("[x](y) `z` @me"), "\\[x\\](y) \\`z\\` &#64;me");
+        assert_eq!(escape_markdown("a|b\n<img src=x>"), "a\\|b &lt;img src=x&gt;");
+        assert_eq!(escape_markdown("[x](y) `z` @me"), "\\[x\\](y) \\`z\\` &#64;me");
     }
 }

@@ -3,12 +3,12 @@
 use super::limits::Limits;
 use super::measured::Check;
 use super::reasons;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_core::{ErrorStats, Severity, Warning};
 use armcal_result::{RecordingRun, Run};
 
 /// Errors on points that the fit did not see.
-pub fn errors(run: &Run, limits: &Limits) -> Vec<Check> {
+pub fn check_errors(run: &Run, limits: &Limits) -> Vec<Check> {
     let section = &limits.section;
     let stats = run.calibration.holdout.fitted;
     let mm = |value_m: f64| (stats.n > 0).then_some(value_m * 1e3);
@@ -45,18 +45,18 @@ fn by_recording(run: &Run) -> String {
         let residuals = run.calibration.residuals.iter().filter(|r| r.held_out && r.dwell.recording == index);
         let norms_m: Vec<f64> = residuals.map(|r| r.fitted_m.norm()).collect();
         let mean_mm = ErrorStats::of_norms(&norms_m).mean_m * 1e3;
-        (!norms_m.is_empty()).then(|| format!("{} {mean_mm:.2}", printable(&recording.name)))
+        (!norms_m.is_empty()).then(|| format!("{} {mean_mm:.2}", printable_name(&recording.name)))
     };
     let all: Vec<String> = run.recordings.iter().enumerate().filter_map(of).collect();
     format!("mean by recording: {} mm", all.join(", "))
 }
 
 /// Dwells found, and their share that the fit could not use, recording by recording.
-pub fn dwells(run: &Run, limits: &Limits) -> Vec<Check> {
+pub fn check_dwells(run: &Run, limits: &Limits) -> Vec<Check> {
     let section = &limits.section;
     let mut checks = Vec::new();
     for recording in &run.recordings {
-        let (name, found) = (printable(&recording.name), recording.dwells.len());
+        let (name, found) = (printable_name(&recording.name), recording.dwells.len());
         let said = format!("`{name}` has {found} dwells");
         if let Some(least) = section.min_dwells {
             let check = Check::count(format!("min_dwells.{name}"), found, least, found >= least);
@@ -66,14 +66,14 @@ pub fn dwells(run: &Run, limits: &Limits) -> Vec<Check> {
             let check = Check::count(format!("dwells.{name}"), found, exactly, found == exactly);
             checks.push(check.saying(said, || other_dwells(recording)));
         }
-        checks.extend(section.max_rejected_share.map(|limit| rejected(recording, &name, limit)));
+        checks.extend(section.max_rejected_share.map(|limit| check_rejections(recording, &name, limit)));
     }
     checks
 }
 
 /// Why a recording may have another number of dwells than expected.
 fn other_dwells(recording: &RecordingRun) -> Vec<String> {
-    let mut why = severe(recording.all_warnings().into_iter());
+    let mut why = severe_warnings(recording.all_warnings().into_iter());
     why.push(
         "Dwells were left out or added by hand, the recording is cut short, or [dwell] splits or joins them: \
          `armcal inspect` shows gaps, summary.json every dwell under `places`."
@@ -82,7 +82,7 @@ fn other_dwells(recording: &RecordingRun) -> Vec<String> {
     why
 }
 
-fn rejected(recording: &RecordingRun, name: &str, limit: f64) -> Check {
+fn check_rejections(recording: &RecordingRun, name: &str, limit: f64) -> Check {
     let (n, of) = (recording.rejections.len(), recording.dwells.len());
     let share = if of == 0 { 1.0 } else { n as f64 / of as f64 };
     let said = format!("{n} of the {of} dwells of `{name}` do not take part in the fit");
@@ -90,7 +90,7 @@ fn rejected(recording: &RecordingRun, name: &str, limit: f64) -> Check {
     check.saying(said, || {
         let mut why: Vec<String> = Vec::new();
         for rejection in &recording.rejections {
-            let sentence = format!("Dwell {}: {}.", rejection.dwell.dwell, printable(&rejection.why));
+            let sentence = format!("Dwell {}: {}.", rejection.dwell.dwell, printable_name(&rejection.why));
             why.push(sentence);
         }
         listed_up(why, "dwells")
@@ -111,7 +111,7 @@ pub fn listed_up(mut all: Vec<String>, what: &str) -> Vec<String> {
 }
 
 /// Warnings by severity.
-pub fn warnings(run: &Run, limits: &Limits) -> Vec<Check> {
+pub fn check_warnings(run: &Run, limits: &Limits) -> Vec<Check> {
     let most = limits.section.max_warnings.unwrap_or_default();
     let all = all_warnings(run);
     let keys = [
@@ -150,7 +150,7 @@ pub fn all_warnings(run: &Run) -> Vec<Told> {
     let told = |w: &Warning, text: String| Told {
         severity: w.severity,
         code: w.code.to_string(),
-        text: run.in_words(&printable(&text)),
+        text: run.in_words(&printable_name(&text)),
     };
     let of_recordings = run
         .recordings
@@ -160,7 +160,7 @@ pub fn all_warnings(run: &Run) -> Vec<Told> {
     of_recordings.chain(overall).collect()
 }
 
-fn severe<'w>(warnings: impl Iterator<Item = &'w Warning>) -> Vec<String> {
+fn severe_warnings<'w>(warnings: impl Iterator<Item = &'w Warning>) -> Vec<String> {
     let grave = warnings.filter(|w| w.severity > Severity::Notice);
-    listed_up(grave.map(|w| printable(&format!("{w}."))).collect(), "warnings")
+    listed_up(grave.map(|w| printable_name(&format!("{w}."))).collect(), "warnings")
 }

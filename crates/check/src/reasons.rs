@@ -3,7 +3,7 @@
 use super::limits::Limits;
 use super::numbers::{all_warnings, listed_up};
 use armcal_calibrate::Estimate;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_core::{Role, Severity};
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport};
 use armcal_model::{EffectSpec, Since, Target};
@@ -15,8 +15,8 @@ use armcal_wording::{amplitude_text, channel_told, driver_told, look_at};
 pub fn of_run(run: &Run, limits: &Limits) -> Vec<String> {
     let mut reasons = bodies_moved(run);
     if let Some(d) = &run.diagnosis {
-        reasons.extend(d.effects.iter().map(|effect| run.in_words(&found(run, limits, effect))));
-        reasons.extend(d.unlisted.iter().map(unlisted));
+        reasons.extend(d.effects.iter().map(|effect| run.in_words(&effect_sentence(run, limits, effect))));
+        reasons.extend(d.unlisted.iter().map(unlisted_sentence));
     }
     reasons.extend(on_bounds(run));
     let grave = all_warnings(run).into_iter().filter(|w| w.severity > Severity::Notice && w.code != MOVED);
@@ -46,14 +46,14 @@ fn bodies_moved(run: &Run) -> Vec<String> {
                 .strip_prefix("a body that should stand still moved: ")
                 .unwrap_or(&warning.message);
             let text = format!("In `{}` the {} moved: {how}. {cause}", recording.name, warning.subject);
-            reasons.push(printable(&text));
+            reasons.push(printable_name(&text));
         }
     }
     reasons
 }
 
 /// An effect that the diagnosis found: what happened, where, how large, and what to look at.
-fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
+fn effect_sentence(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
     let joints = run.model.chain().joint_names();
     let sizes: Vec<String> = effect.parameters.iter().map(amplitude_text).collect();
     let others: Vec<&str> = effect.set.iter().filter(|n| **n != effect.name).map(String::as_str).collect();
@@ -64,7 +64,7 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
     let Some((spec, kind)) =
         EffectSpec::parse(&effect.name, joints).ok().and_then(|s| s.kind().ok().map(|k| (s, k)))
     else {
-        return printable(&format!("{}: {}.{rivals}", effect.name, sizes.join(", ")));
+        return printable_name(&format!("{}: {}.{rivals}", effect.name, sizes.join(", ")));
     };
     let joint = spec.target.and_then(|j| joints.get(j)).map_or("", String::as_str);
     let teeth = match (kind.name, effect.parameters.first()) {
@@ -76,10 +76,10 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
         (_, Some(marker)) => format!(" of {marker}"),
         _ => String::new(),
     };
-    printable(&format!(
+    printable_name(&format!(
         "`{}`{at}{}: {}; {}{teeth}.{rivals} {} If it is here to stay, `armcal add {} PIPELINE` models it.",
         effect.name,
-        when(run, spec.since),
+        since_text(run, spec.since),
         kind.summary,
         sizes.join(", "),
         look_at(kind),
@@ -88,15 +88,15 @@ fn found(run: &Run, limits: &Limits, effect: &FoundEffect) -> String {
 }
 
 /// `, from dwell 17 of `roll` on`; `, in dwells 17 to 25 of `roll`; `, in `roll` as against the others`.
-fn when(run: &Run, since: Option<Since>) -> String {
+fn since_text(run: &Run, since: Option<Since>) -> String {
     let beside =
         if matches!(since, Some(Since::Recording(_))) { " as against the other recordings" } else { "" };
     let moment = since.and_then(|since| run.recording_names().moment(since));
     moment.map_or(String::new(), |moment| format!(",{moment}{beside}"))
 }
 
-fn unlisted(u: &UnknownReport) -> String {
-    printable(&format!(
+fn unlisted_sentence(u: &UnknownReport) -> String {
+    printable_name(&format!(
         "Something unlisted enters at {} and depends on {}: `armcal diagnose` shows its shape and a formula to add.",
         channel_told(&u.channel),
         driver_told(&u.driver)
@@ -117,7 +117,7 @@ fn on_bounds(run: &Run) -> Vec<String> {
             None => "it wants to go further, or something missing pulls there".to_owned(),
         };
         let (name, unit) = (&p.name, p.unit.display_symbol());
-        printable(&format!("`{name}` is on its bound, {change:+.3} {unit} from nominal: {cause}."))
+        printable_name(&format!("`{name}` is on its bound, {change:+.3} {unit} from nominal: {cause}."))
     });
     listed_up(bounded.collect(), "parameters on their bounds")
 }
@@ -141,6 +141,6 @@ fn nothing_said(diagnosis: Option<&Diagnosis>) -> String {
 }
 
 /// Whether the fit explains its data: the parameters of one that does not are pulled about by what is missing.
-pub fn healthy(run: &Run) -> bool {
+pub fn is_model_adequate(run: &Run) -> bool {
     run.status() == Status::Ok && run.diagnosis.as_ref().is_none_or(|d| d.effects.is_empty())
 }

@@ -5,7 +5,7 @@ use super::measured::Check;
 use super::numbers::listed_up;
 use super::reasons;
 use super::reference::{Calibrated, FittedParameter};
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_result::Run;
 
 /// A parameter in both results.
@@ -26,7 +26,7 @@ impl Shift<'_> {
 }
 
 /// Lengths and angles of the arm and of its effects. A change counts only beyond what the uncertainties explain.
-pub fn shifts(run: &Run, now: &Calibrated, limits: &Limits) -> Vec<Check> {
+pub fn check_parameter_shifts(run: &Run, now: &Calibrated, limits: &Limits) -> Vec<Check> {
     let Some(reference) = &limits.reference else { return Vec::new() };
     let section = &limits.section;
     let rows = [
@@ -42,15 +42,15 @@ pub fn shifts(run: &Run, now: &Calibrated, limits: &Limits) -> Vec<Check> {
             let largest = real.first().map_or(0.0, |s| s.by.abs() * to_display);
             let measured = (!all.is_empty()).then_some(largest);
             let check = Check::at_most(name, measured, limit, shown);
-            let said = said(what, &all, &real, reference);
+            let said = shift_summary(what, &all, &real, reference);
             Some(check.saying(said, || {
                 real.retain(|s| s.by.abs() * to_display > limit);
                 // With tens of parameters the one that jumped stands out by its significance, not always by its size.
                 real.sort_by(|a, b| b.sigmas().total_cmp(&a.sigmas()));
-                let moved = real.iter().map(|s| sentence(s, to_display, shown, limits)).collect();
+                let moved = real.iter().map(|s| shift_sentence(s, to_display, shown, limits)).collect();
                 let mut why = listed_up(moved, "parameters");
-                why.extend(differences(reference, now));
-                if !reasons::healthy(run) {
+                why.extend(model_differences(reference, now));
+                if !reasons::is_model_adequate(run) {
                     why.extend(reasons::of_run(run, limits));
                 }
                 why
@@ -69,8 +69,8 @@ fn shifts_of<'a>(reference: &'a Calibrated, now: &'a Calibrated, unit: &str) -> 
         .collect()
 }
 
-fn said(what: &str, all: &[Shift<'_>], real: &[&Shift<'_>], reference: &Calibrated) -> String {
-    let than = printable(&reference.pipeline);
+fn shift_summary(what: &str, all: &[Shift<'_>], real: &[&Shift<'_>], reference: &Calibrated) -> String {
+    let than = printable_name(&reference.pipeline);
     match (all.len(), real.first()) {
         (0, _) => {
             format!("no {what} is in both this result and the reference (`{than}`), so nothing was compared")
@@ -79,12 +79,12 @@ fn said(what: &str, all: &[Shift<'_>], real: &[&Shift<'_>], reference: &Calibrat
         (n, Some(largest)) => format!(
             "{} of {n} {what}s differ from the reference by more than chance, most of all `{}`",
             real.len(),
-            printable(&largest.parameter.name)
+            printable_name(&largest.parameter.name)
         ),
     }
 }
 
-fn sentence(shift: &Shift<'_>, to_display: f64, unit: &str, limits: &Limits) -> String {
+fn shift_sentence(shift: &Shift<'_>, to_display: f64, unit: &str, limits: &Limits) -> String {
     let p = shift.parameter;
     let zero = reasons::zero_of(&p.name);
     let teeth = zero.map_or(String::new(), |joint| limits.in_teeth(joint, shift.by));
@@ -106,14 +106,14 @@ fn sentence(shift: &Shift<'_>, to_display: f64, unit: &str, limits: &Limits) -> 
     };
     let bound = if p.at_bound { " It is on its bound: the true change may be larger." } else { "" };
     let by = shift.by * to_display;
-    printable(&format!("`{}` moved by {by:+.3} {unit} ({sigmas}{teeth}). {cause}{bound}", p.name))
+    printable_name(&format!("`{}` moved by {by:+.3} {unit} ({sigmas}{teeth}). {cause}{bound}", p.name))
 }
 
 /// What only one of the two models has: the others may differ because of it.
-fn differences(reference: &Calibrated, now: &Calibrated) -> Option<String> {
+fn model_differences(reference: &Calibrated, now: &Calibrated) -> Option<String> {
     let only_in = |a: &Calibrated, b: &Calibrated| -> Vec<String> {
         let missing = |p: &&FittedParameter| b.of_arm().all(|q| q.name != p.name);
-        a.of_arm().filter(missing).map(|p| printable(&p.name)).collect()
+        a.of_arm().filter(missing).map(|p| printable_name(&p.name)).collect()
     };
     let (gone, new) = (only_in(reference, now), only_in(now, reference));
     let part = |names: &[String], whose: &str| match names {
@@ -176,7 +176,7 @@ mod tests {
         let names: Vec<&str> = shifts.iter().map(|s| s.parameter.name.as_str()).collect();
         assert_eq!(names, ["joint1.theta"]);
         assert!(shifts_of(&then, &now, "m").is_empty());
-        let said = differences(&then, &now).expect("another model");
+        let said = model_differences(&then, &now).expect("another model");
         assert!(said.contains("`backlash:1.width` is only in this result"), "{said}");
     }
 }

@@ -1,7 +1,7 @@
 //! The checks for a person in the terminal.
 
 use super::{Check, Judged};
-use armcal_report::{number, plain_table, table_text};
+use armcal_report::{number_cell, plain_table, table_text};
 use comfy_table::{Cell, ContentArrangement};
 
 /// Widest line.
@@ -9,25 +9,25 @@ const COLUMNS: u16 = 100;
 
 /// A table, the causes of what is broken, and the answer as the last line.
 pub fn text(judged: &Judged) -> String {
-    let mut text = table(&judged.checks);
+    let mut text = check_table(&judged.checks);
     for (checks, sentences) in causes(judged) {
-        text.push_str(&format!("\n{checks}\n{}", list(&sentences)));
+        text.push_str(&format!("\n{checks}\n{}", bullet_list(&sentences)));
     }
     if !judged.doubts.is_empty() {
-        text.push_str(&format!("\nWhat makes it doubtful\n{}", list(&judged.doubts)));
+        text.push_str(&format!("\nWhat makes it doubtful\n{}", bullet_list(&judged.doubts)));
     }
     format!("{text}\n{}\n", judged.line)
 }
 
-fn table(checks: &[Check]) -> String {
+fn check_table(checks: &[Check]) -> String {
     let mut table = plain_table();
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(COLUMNS);
     table.set_header(["check", "measured", "limit", ""]);
     for check in checks {
         table.add_row(vec![
             Cell::new(&check.name),
-            number(check.measured_text()),
-            number(check.limit_text()),
+            number_cell(check.measured_text()),
+            number_cell(check.limit_text()),
             Cell::new(if check.holds { "holds" } else { "BROKEN" }),
         ]);
     }
@@ -57,7 +57,7 @@ pub fn causes(judged: &Judged) -> Vec<(String, Vec<String>)> {
     causes
 }
 
-fn list(sentences: &[String]) -> String {
+fn bullet_list(sentences: &[String]) -> String {
     let mut table = plain_table();
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(COLUMNS);
     for sentence in sentences {

@@ -11,7 +11,7 @@ use armcal_result::Run;
 ///
 /// An effect that the data cannot tell from others may be missing only if every one of its names may: the limit must
 /// not hold by the choice of a name.
-pub fn verdict(run: &Run, limits: &Limits) -> Option<Check> {
+pub fn check_verdict(run: &Run, limits: &Limits) -> Option<Check> {
     let section = &limits.section;
     if !section.limits_verdict() {
         return None;
@@ -32,26 +32,26 @@ pub fn verdict(run: &Run, limits: &Limits) -> Option<Check> {
     let effects = limits.allowed.iter().map(EffectSpec::to_string);
     let check = Check {
         name: if section.verdicts.is_some() { "verdicts" } else { "allowed_effects" }.to_owned(),
-        measured: diagnosis.map_or(Measured::Nothing, |d| Measured::Words(answer(d))),
+        measured: diagnosis.map_or(Measured::Nothing, |d| Measured::Words(verdict_text(d))),
         limit: Measured::Words(words.chain(effects).collect::<Vec<_>>().join(", ")),
         unit: "",
         holds,
         said: String::new(),
         why: Vec::new(),
     };
-    let said = uncapitalised(&armcal_wording::answer(run).sentence);
+    let said = as_clause(&armcal_wording::answer(run).sentence);
     Some(check.saying(said, || reasons::of_run(run, limits)))
 }
 
 /// The verdict with its names: `identified: zero_slip:2@1`.
-fn answer(d: &Diagnosis) -> String {
+fn verdict_text(d: &Diagnosis) -> String {
     let names = d.names.join(", ");
     let word = d.verdict.word();
     if names.is_empty() { word.to_owned() } else { format!("{word}: {names}") }
 }
 
 /// A sentence as the end of another one: without its capital and full stop.
-fn uncapitalised(sentence: &str) -> String {
+fn as_clause(sentence: &str) -> String {
     let mut rest = sentence.trim_end_matches('.').chars();
     rest.next().map_or(String::new(), |first| first.to_lowercase().chain(rest).collect())
 }

@@ -3,7 +3,7 @@
 use crate::crossing::leap_rad;
 use crate::direction::Found;
 use crate::inverse::Miss;
-use crate::set_points::{Compensator, SetPoint, at};
+use crate::set_points::{Compensator, SetPoint, observation_at};
 use crate::{CompensateError, Past, Target};
 use armcal_core::{Arrival, Observation, Unit};
 
@@ -76,7 +76,7 @@ impl Compensator<'_> {
         let mut signs = found.past.signs(q);
         let mut tip_m = |sign: f64| {
             signs[joint] = sign;
-            let o = at(o, &found.past.arriving(q, &signs), q);
+            let o = observation_at(o, &found.past.arriving(q, &signs), q);
             self.calibrated.model.predicted_tip_in_world(&self.calibrated.values, &o)
         };
         (tip_m(1.0) - tip_m(-1.0)).norm()

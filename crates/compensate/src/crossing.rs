@@ -18,8 +18,8 @@ pub(crate) fn leap_rad(last: [f64; 2], next: [f64; 2]) -> Option<f64> {
 }
 
 /// Spreads every leap between points with times over `crossing_s`, and marks the points inside. Returns whether there was any.
-pub(crate) fn spread(points: &mut [SetPoint], crossing_s: f64) -> bool {
-    let leaps = leaps(points);
+pub(crate) fn spread_leaps(points: &mut [SetPoint], crossing_s: f64) -> bool {
+    let leaps = find_leaps(points);
     let first_s = points.first().and_then(|p| p.target.time_s).unwrap_or(0.0);
     for (index, joint, size) in &leaps {
         let time = |i: usize| points[i].target.time_s.unwrap_or(0.0);
@@ -39,7 +39,7 @@ pub(crate) fn spread(points: &mut [SetPoint], crossing_s: f64) -> bool {
 }
 
 /// Point, joint, size [rad] of every leap.
-fn leaps(points: &[SetPoint]) -> Vec<(usize, usize, f64)> {
+fn find_leaps(points: &[SetPoint]) -> Vec<(usize, usize, f64)> {
     let mut all = Vec::new();
     for (i, pair) in points.windows(2).enumerate() {
         if pair[0].target.time_s.is_none() || pair[1].target.time_s.is_none() {

@@ -75,7 +75,7 @@ impl Way<'_> {
 
 /// The set-point that brings the tip to `target`, after the path `before`, near `start_rad`, which also says in which
 /// direction each joint is likely to travel.
-pub(crate) fn invert(
+pub(crate) fn invert_model(
     arm: &Arm<'_>,
     target: &Observation,
     before: &Past,
@@ -121,7 +121,7 @@ pub(crate) fn invert(
         }
         // Few flips first; what nothing depends on is not flipped.
         let telling = telling.get_or_insert_with(|| telling_lanes(arm, target, before, start_rad, &signs));
-        open.extend(telling.iter().map(|lane| flipped(&signs, *lane)));
+        open.extend(telling.iter().map(|lane| flip_sign(&signs, *lane)));
         tried.push(signs);
     }
     let Some(best) = best else {
@@ -136,7 +136,7 @@ fn telling_lanes(arm: &Arm<'_>, target: &Observation, before: &Past, q: &[f64], 
     let residual = |signs: &[f64]| arm.linearised(target, &before.arriving(q, signs), q).0;
     let here = residual(signs);
     let moves = |lane: &usize| {
-        let there = residual(&flipped(signs, *lane));
+        let there = residual(&flip_sign(signs, *lane));
         let turned_rad = match (there.rotation_rad, here.rotation_rad) {
             (Some(a), Some(b)) => (a - b).norm(),
             _ => 0.0,
@@ -146,7 +146,7 @@ fn telling_lanes(arm: &Arm<'_>, target: &Observation, before: &Past, q: &[f64], 
     (0..signs.len()).filter(moves).collect()
 }
 
-fn flipped(signs: &[f64], lane: usize) -> Vec<f64> {
+fn flip_sign(signs: &[f64], lane: usize) -> Vec<f64> {
     let mut other = signs.to_vec();
     other[lane] = -other[lane];
     other

@@ -64,7 +64,7 @@ impl TargetFrame {
 
 /// Joints that stay where they are while the tip is brought to a target: those off the way to it, and those that move another
 /// branch too, unless a range is given for them.
-pub fn held(model: &Model, tip: FeatureId, drive: &Drive) -> Vec<usize> {
+pub fn held_joints(model: &Model, tip: FeatureId, drive: &Drive) -> Vec<usize> {
     let (own, shared) = (model.joints_to(tip), model.joints_shared_by(tip));
     let moves = |joint: &usize| {
         own.contains(joint) && (!shared.contains(joint) || drive.ranges.iter().any(|(j, _)| j == joint))

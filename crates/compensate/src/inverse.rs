@@ -82,7 +82,7 @@ pub fn solve(
                 break;
             }
             kicks += 1;
-            next = kicked(&q, kicks);
+            next = perturb_posture(&q, kicks);
             limits.clamp(&mut next);
             (q, at) = (next.clone(), Point::of(linearised(next.as_slice())));
             continue;
@@ -102,7 +102,7 @@ pub fn solve(
 }
 
 /// The posture, every joint bent a little, neighbours to opposite sides.
-fn kicked(q: &DVector<f64>, kick: usize) -> DVector<f64> {
+fn perturb_posture(q: &DVector<f64>, kick: usize) -> DVector<f64> {
     let bend =
         |j: usize, q: f64| q + KICK_RAD * kick as f64 * if (j + kick).is_multiple_of(2) { 1.0 } else { -1.0 };
     DVector::from_iterator(q.len(), q.iter().enumerate().map(|(j, q)| bend(j, *q)))

@@ -34,7 +34,7 @@ pub mod target;
 #[cfg(test)]
 mod tests;
 
-pub use drive::{Drive, TargetFrame, held};
+pub use drive::{Drive, TargetFrame, held_joints};
 pub use error::CompensateError;
 pub use inverse::Limits;
 pub use set_points::{Arm, Compensator, Kind, Reached, SetPoint, Underway};

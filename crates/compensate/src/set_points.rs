@@ -1,7 +1,7 @@
 //! One target after the other: the set-point of the nominal arm, the corrected one, and what each would reach.
 
 use crate::crossing;
-use crate::direction::{Way, invert};
+use crate::direction::{Way, invert_model};
 use crate::inverse::{Limits, Miss};
 use crate::{CompensateError, Conditions, Past, Target};
 use armcal_core::{Arrival, Observation};
@@ -26,18 +26,18 @@ impl Arm<'_> {
         past: &Past,
         q: &[f64],
     ) -> (ModelResidual, DMatrix<f64>) {
-        self.model.residual_with_joint_jacobian(&self.values, &at(target, past, q))
+        self.model.residual_with_joint_jacobian(&self.values, &observation_at(target, past, q))
     }
 
     /// What is left to the target after this past: distance [m] and rotation [rad].
     pub(crate) fn left(&self, target: &Observation, past: &Past, q: &[f64]) -> (f64, f64) {
-        let residual = self.model.residual(&self.values, &at(target, past, q));
+        let residual = self.model.residual(&self.values, &observation_at(target, past, q));
         (residual.position_m.norm(), residual.rotation_rad.map_or(0.0, |r| r.norm()))
     }
 }
 
 /// The target with readings and their past.
-pub(crate) fn at(target: &Observation, past: &Past, q: &[f64]) -> Observation {
+pub(crate) fn observation_at(target: &Observation, past: &Past, q: &[f64]) -> Observation {
     let mut o = target.clone();
     past.clone().into_observation(q, &mut o);
     o
@@ -163,7 +163,7 @@ impl Compensator<'_> {
     /// Spreads the leaps of a path that began after `start` over [`Compensator::crossing_s`], and says again what it reaches; the
     /// arm then stands at its end.
     pub fn cross(&self, path: &mut [SetPoint], start: Past, underway: &mut Underway) {
-        if self.crossing_s > 0.0 && crossing::spread(path, self.crossing_s) {
+        if self.crossing_s > 0.0 && crossing::spread_leaps(path, self.crossing_s) {
             underway.corrected = self.predict_again(path, start);
             underway.last = path.last().cloned();
         }
@@ -187,7 +187,7 @@ impl Compensator<'_> {
     /// What the models are asked about an arm at these readings [rad] after this past.
     pub fn observation(&self, past: &Past, joint_rad: &[f64]) -> Observation {
         let anywhere = Target::in_world("", Vector3::zeros(), None);
-        at(&self.conditions.observation(&anywhere, joint_rad.len()), past, joint_rad)
+        observation_at(&self.conditions.observation(&anywhere, joint_rad.len()), past, joint_rad)
     }
 
     /// The same where the nominal set-point [rad] is known.
@@ -207,11 +207,11 @@ impl Compensator<'_> {
         let [nominal_way, way] = [0, 1].map(|k| offs.as_ref().map_or(Way::Direct, |offs| Way::By(&offs[k])));
         // Travel is that of the nominal arm; from where the corrected one stands.
         let likely = match (past.joint_rad(), nominal_past.joint_rad()) {
-            (Some(stands), Some(stood)) => moved(&stands, &stood, &nominal),
+            (Some(stands), Some(stood)) => add_travel(&stands, &stood, &nominal),
             _ => nominal.clone(),
         };
-        let found = invert(&self.calibrated, &o, past, way, &likely, &self.limits)
-            .or_else(|_| invert(&self.calibrated, &o, past, way, &nominal, &self.limits))
+        let found = invert_model(&self.calibrated, &o, past, way, &likely, &self.limits)
+            .or_else(|_| invert_model(&self.calibrated, &o, past, way, &nominal, &self.limits))
             .map_err(|miss| self.unreachable(target, "calibrated", &miss, 2))?;
         let nominal_after = nominal_way.past(nominal_past, &nominal);
         let mut out = Vec::with_capacity(2);
@@ -293,7 +293,7 @@ impl Compensator<'_> {
         let mut count = 0;
         for start in stands_rad.into_iter().chain(self.starts(o, &unknown)) {
             count += 1;
-            match invert(&self.nominal, o, &unknown, Way::Direct, &start, &self.limits) {
+            match invert_model(&self.nominal, o, &unknown, Way::Direct, &start, &self.limits) {
                 Ok(found) => return Ok(found.joint_rad),
                 Err(miss) if nearest.as_ref().is_none_or(|n| miss.left_m < n.left_m) => nearest = Some(miss),
                 Err(_) => {}
@@ -341,7 +341,7 @@ impl Compensator<'_> {
 }
 
 /// `stands` moved by the way from `stood` to `to`.
-fn moved(stands: &[f64], stood: &[f64], to: &[f64]) -> Vec<f64> {
+fn add_travel(stands: &[f64], stood: &[f64], to: &[f64]) -> Vec<f64> {
     stands.iter().zip(stood.iter().zip(to)).map(|(q, (from, to))| q + (to - from)).collect()
 }
 

@@ -33,7 +33,7 @@ pub fn resample(waypoints: &[Target], rate_hz: f64) -> Result<Vec<Target>, Compe
     }
     let times: Vec<f64> = waypoints.iter().filter_map(|w| w.time_s).collect();
     let points: Vec<Vector3<f64>> = waypoints.iter().map(Target::position_m).collect();
-    let velocities = velocities(&times, &points);
+    let velocities = waypoint_velocities(&times, &points);
     let (from_s, to_s) = (times[0], times[times.len() - 1]);
     let count = ((to_s - from_s) * rate_hz).round().max(1.0) as usize;
     let width = count.to_string().len();
@@ -44,14 +44,14 @@ pub fn resample(waypoints: &[Target], rate_hz: f64) -> Result<Vec<Target>, Compe
         let share = ((time_s - times[section]) / duration_s).clamp(0.0, 1.0);
         let ends = [points[section], points[section + 1]];
         let position_m = hermite(ends, [velocities[section], velocities[section + 1]], duration_s, share);
-        let place = placed(&waypoints[section], &waypoints[section + 1], position_m, share);
+        let place = interpolate_reference(&waypoints[section], &waypoints[section + 1], position_m, share);
         Target { name: format!("{}+{i:0width$}", first.name), place, time_s: Some(time_s) }
     };
     Ok((0..=count).map(at).collect())
 }
 
 /// Velocities at the waypoints [m/s].
-fn velocities(times: &[f64], points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+fn waypoint_velocities(times: &[f64], points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mean = |i: usize| (points[i + 1] - points[i]) / (times[i + 1] - times[i]);
     let inner = |i: usize| {
         let (before_s, after_s) = (times[i] - times[i - 1], times[i + 1] - times[i]);
@@ -70,7 +70,7 @@ fn hermite(ends: [Vector3<f64>; 2], speeds: [Vector3<f64>; 2], duration_s: f64, 
         + speeds[1] * ((s3 - s2) * duration_s)
 }
 
-fn placed(from: &Target, to: &Target, position_m: Vector3<f64>, share: f64) -> Reference {
+fn interpolate_reference(from: &Target, to: &Target, position_m: Vector3<f64>, share: f64) -> Reference {
     match (&from.place, &to.place) {
         (
             Reference::Tracked { orientation: Some(a), .. },

@@ -1,7 +1,7 @@
 //! `[closed_chain]`: which two points are joined, and by what.
 
 use crate::FramePose;
-use crate::measures::knowledge;
+use crate::measures::length_knowledge;
 use armcal_model::Length;
 use serde::Deserialize;
 
@@ -51,6 +51,6 @@ impl ClosedChainSection {
     /// The rigid link between the tips, where that is what joins them.
     pub fn link(&self) -> Option<Length> {
         let length_m = self.length_mm.filter(|_| self.kind == ClosureKind::RigidLink)? * 1e-3;
-        Some(Length::of_link(length_m, knowledge(self.length, self.length_sigma_mm)))
+        Some(Length::of_link(length_m, length_knowledge(self.length, self.length_sigma_mm)))
     }
 }

@@ -74,7 +74,7 @@ impl FrameSection {
     pub fn frame(&self, name: &str, free_rotation: bool) -> Frame {
         let knowledge = match self.pose {
             FramePose::Given => Knowledge::Given,
-            FramePose::Measured => measured(self.sigma_mm, self.sigma_deg),
+            FramePose::Measured => pose_knowledge(self.sigma_mm, self.sigma_deg),
             FramePose::Estimated => Knowledge::Estimated,
         };
         Frame { name: name.into(), pose: self.at.into(), knowledge, free_rotation }
@@ -82,7 +82,7 @@ impl FrameSection {
 }
 
 /// Zero standard error means that the pose is taken as exact.
-pub fn measured(sigma_mm: f64, sigma_deg: f64) -> Knowledge {
+pub fn pose_knowledge(sigma_mm: f64, sigma_deg: f64) -> Knowledge {
     if sigma_mm == 0.0 && sigma_deg == 0.0 {
         return Knowledge::Given;
     }

@@ -36,7 +36,7 @@ pub use accuracy::AccuracySection;
 pub use check::{CheckSection, MaxWarnings, Surroundings};
 pub use closed_chain::{ClosedChainSection, ClosureKind};
 pub use error::ConfigError;
-pub use frames::{FramePose, FrameSection, FramesSection, SensorSection, Vertical, measured};
+pub use frames::{FramePose, FrameSection, FramesSection, SensorSection, Vertical, pose_knowledge};
 pub use loads::LoadEntry;
 pub use manifest::{Manifest, recordings_below};
 pub use markers::MarkerSection;

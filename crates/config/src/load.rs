@@ -65,7 +65,7 @@ impl Pipeline {
             if entry.paths.iter().any(is_folder) {
                 entry.name = Some(entry.name());
                 let paths: Vec<PathBuf> =
-                    entry.paths.iter().map(|p| armcal_recording::resolve(&self.folder, p)).collect();
+                    entry.paths.iter().map(|p| armcal_recording::resolve_path(&self.folder, p)).collect();
                 entry.paths = files_of(&paths);
             }
         }
@@ -76,11 +76,11 @@ impl Pipeline {
         let model = self.models().into_iter().flat_map(|model| [&model.dh, &model.urdf]).flatten();
         let board = self.table.iter().map(|table| &table.board);
         let recordings = self.recordings.iter().flat_map(|entry| &entry.paths);
-        model.chain(board).chain(recordings).for_each(|path| input::note(&self.resolve(path)));
+        model.chain(board).chain(recordings).for_each(|path| input::register_path(&self.resolve(path)));
         if let Some(reference) = &self.check.reference {
             let reference = self.resolve(reference);
             let inside = ["summary.json", "run.mcap"].map(|name| reference.join(name));
-            inside.iter().chain([&reference]).for_each(|path| input::note(path));
+            inside.iter().chain([&reference]).for_each(|path| input::register_path(path));
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Which recordings: from globs, files and bag folders, or from a manifest file.
 
-use super::pattern::matching;
+use super::pattern::matching_paths;
 use crate::{ConfigError, RecordingEntry};
-use armcal_recording::{input, is_recording, is_url, list, recordings_at, resolve, without_ending};
+use armcal_recording::{
+    input, is_recording, is_url, list_objects, recordings_at, resolve_path, without_ending,
+};
 use armcal_table::Tilt;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -54,15 +56,15 @@ impl Manifest {
             let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
             ManifestFile {
                 pipeline: None,
-                recordings: lines.map(|line| unnamed(vec![line.into()])).collect(),
+                recordings: lines.map(|line| unnamed_entry(vec![line.into()])).collect(),
             }
         };
         let mut entries = file.recordings;
         for entry in &mut entries {
             if let Some(points) = &mut entry.points {
-                points.csv = resolve(&folder, &points.csv);
+                points.csv = resolve_path(&folder, &points.csv);
             }
-            entry.paths = entry.paths.iter().flat_map(|p| recordings_at(&resolve(&folder, p))).collect();
+            entry.paths = entry.paths.iter().flat_map(|p| recordings_at(&resolve_path(&folder, p))).collect();
         }
         let pipeline = file.pipeline.map(|p| folder.join(p));
         Manifest { entries, pipeline }.checked(&path.display().to_string())
@@ -78,9 +80,11 @@ impl Manifest {
             }
             let before = files.len();
             if is_url(Path::new(input)) {
-                files.extend(list(input).map_err(|e| bad(e.to_string()))?.into_iter().map(PathBuf::from));
+                files.extend(
+                    list_objects(input).map_err(|e| bad(e.to_string()))?.into_iter().map(PathBuf::from),
+                );
             } else {
-                for found in matching(input).map_err(bad)? {
+                for found in matching_paths(input).map_err(bad)? {
                     let found = std::path::absolute(&found).unwrap_or(found);
                     files.extend(recordings_below(&found).into_iter().filter(|p| !p.starts_with(&out)));
                 }
@@ -151,7 +155,7 @@ fn as_bags(files: Vec<PathBuf>) -> Vec<RecordingEntry> {
             _ => bags.push((bag, vec![file])),
         }
     }
-    bags.into_iter().map(|(_, parts)| unnamed(parts)).collect()
+    bags.into_iter().map(|(_, parts)| unnamed_entry(parts)).collect()
 }
 
 /// The folder of the bag that a file is a part of, which rosbag2 calls as it was asked to, its parts `NAME_0`, `NAME_1`, ..
@@ -159,7 +163,7 @@ fn bag_of(file: &Path) -> Option<&Path> {
     file.parent().filter(|folder| folder.join("metadata.yaml").is_file())
 }
 
-fn unnamed(paths: Vec<PathBuf>) -> RecordingEntry {
+fn unnamed_entry(paths: Vec<PathBuf>) -> RecordingEntry {
     RecordingEntry { name: None, paths, tilt: Tilt::default(), load_kg: 0.0, loads: Vec::new(), points: None }
 }
 

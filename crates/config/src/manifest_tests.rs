@@ -10,7 +10,7 @@ fn folder_with(files: &[&str]) -> tempfile::TempDir {
     folder
 }
 
-fn names(manifest: &Manifest) -> Vec<String> {
+fn entry_names(manifest: &Manifest) -> Vec<String> {
     manifest.entries.iter().map(RecordingEntry::name).collect()
 }
 
@@ -27,7 +27,7 @@ fn a_glob_finds_recordings_bags_and_no_results() {
     ]);
     let glob = format!("{}/**/*.mcap", folder.path().display());
     let found = Manifest::of(&[glob], &folder.path().join("campaign")).expect("recordings");
-    assert_eq!(names(&found), ["2026-01/a", "2026-02/a", "b", "bag"]);
+    assert_eq!(entry_names(&found), ["2026-01/a", "2026-02/a", "b", "bag"]);
     let sizes: Vec<usize> = found.entries.iter().map(|e| e.paths.len()).collect();
     assert_eq!(sizes, [1, 1, 1, 2]);
 }
@@ -46,7 +46,7 @@ fn both_kinds_of_manifest_say_the_same() {
         [toml, lines].map(|path| Manifest::of(&[path.display().to_string()], &out).expect("a manifest"));
     assert_eq!(toml.pipeline.as_deref(), Some(folder.path().join("p.toml").as_path()));
     assert_eq!(
-        (names(&toml), names(&lines)),
+        (entry_names(&toml), entry_names(&lines)),
         (vec!["two".into(), "one".into()], vec!["two".into(), "one".into()])
     );
     assert_eq!(toml.entries[0].paths, lines.entries[0].paths);

@@ -91,14 +91,14 @@ impl MeasureSection {
 
     /// The length that it counts from.
     pub(crate) fn length(&self) -> Length {
-        let knowledge = knowledge(self.length, self.length_sigma_mm);
+        let knowledge = length_knowledge(self.length, self.length_sigma_mm);
         let length_m = self.length_mm.unwrap_or(0.0) * 1e-3;
         Length { name: self.name().to_owned(), length_m, knowledge }
     }
 }
 
 /// How well a length is known.
-pub(crate) fn knowledge(length: FramePose, sigma_mm: f64) -> Knowledge {
+pub(crate) fn length_knowledge(length: FramePose, sigma_mm: f64) -> Knowledge {
     match length {
         FramePose::Given => Knowledge::Given,
         FramePose::Measured => Knowledge::Measured { sigma_m: sigma_mm * 1e-3, sigma_rad: 0.0 },

@@ -7,15 +7,15 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// A pattern that is none.
-pub(super) fn matching(pattern: &str) -> Result<Vec<PathBuf>, String> {
+pub(super) fn matching_paths(pattern: &str) -> Result<Vec<PathBuf>, String> {
     let parts: Vec<&str> = pattern.split('/').collect();
-    let Some(deep) = parts.iter().position(|part| *part == "**") else { return plain(pattern) };
+    let Some(deep) = parts.iter().position(|part| *part == "**") else { return glob_paths(pattern) };
     let options = glob::MatchOptions { require_literal_separator: true, ..glob::MatchOptions::new() };
     let wanted = glob::Pattern::new(pattern).map_err(|e| e.to_string())?;
     let roots = match &parts[..deep] {
         [] => vec![PathBuf::new()],
         [""] => vec![PathBuf::from("/")],
-        before => plain(&before.join("/"))?,
+        before => glob_paths(&before.join("/"))?,
     };
     let (mut found, mut folders) = (Vec::new(), roots);
     while let Some(folder) = folders.pop() {
@@ -45,14 +45,14 @@ pub(super) fn matching(pattern: &str) -> Result<Vec<PathBuf>, String> {
 }
 
 /// What matches a pattern that stays in its folders.
-fn plain(pattern: &str) -> Result<Vec<PathBuf>, String> {
+fn glob_paths(pattern: &str) -> Result<Vec<PathBuf>, String> {
     let found = glob::glob(pattern).map_err(|e| e.to_string())?;
     Ok(found.map(|path| path.unwrap_or_else(|e| e.path().to_owned())).collect())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::matching;
+    use super::matching_paths;
     use std::path::PathBuf;
 
     #[test]
@@ -73,7 +73,7 @@ mod tests {
         }
         let found = |pattern: &str| -> Vec<PathBuf> {
             let pattern = at(pattern).to_string_lossy().into_owned();
-            let mut found = matching(&pattern).expect("a pattern");
+            let mut found = matching_paths(&pattern).expect("a pattern");
             found.sort();
             found
         };

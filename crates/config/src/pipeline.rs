@@ -125,7 +125,7 @@ impl Pipeline {
 
     /// A path of the pipeline file, resolved against its folder; a URL stays as it is.
     pub fn resolve(&self, path: &Path) -> PathBuf {
-        armcal_recording::resolve(&self.folder, path)
+        armcal_recording::resolve_path(&self.folder, path)
     }
 
     /// Whether a sensor sees the tip, on a stream or point by point.

@@ -3,7 +3,7 @@
 use serde::{Deserialize as _, Deserializer};
 
 /// The list, unless every entry is missing.
-pub fn known(all: Vec<f64>) -> Option<Vec<f64>> {
+pub fn if_any_known(all: Vec<f64>) -> Option<Vec<f64>> {
     all.iter().any(|entry| entry.is_finite()).then_some(all)
 }
 

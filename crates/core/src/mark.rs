@@ -22,11 +22,11 @@ impl DwellMark {
 /// A hash of a stamp and the values at it, the same on every machine.
 pub fn hash_of(time_ns: i64, values: impl Iterator<Item = f64>) -> u64 {
     // Zero has two signs, which are one reading.
-    values.fold(mix(time_ns.cast_unsigned()), |hash, value| mix(hash ^ (value + 0.0).to_bits()))
+    values.fold(mix_bits(time_ns.cast_unsigned()), |hash, value| mix_bits(hash ^ (value + 0.0).to_bits()))
 }
 
 /// Finaliser of SplitMix64 (Steele, Lea and Flood 2014).
-fn mix(seed: u64) -> u64 {
+fn mix_bits(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

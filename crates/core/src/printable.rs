@@ -1,7 +1,7 @@
 //! Names from outside.
 
 /// A name from outside, on one line and without control characters (a terminal would obey them).
-pub fn printable(name: &str) -> String {
+pub fn printable_name(name: &str) -> String {
     name.chars()
         .flat_map(|c| {
             let escaped: Box<dyn Iterator<Item = char>> =
@@ -13,10 +13,10 @@ pub fn printable(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::printable;
+    use super::printable_name;
 
     #[test]
     fn control_characters_do_not_reach_the_terminal() {
-        assert_eq!(printable("a\u{1b}[31m\nb\u{9b}ü"), "a\\u{1b}[31m\\nb\\u{9b}ü");
+        assert_eq!(printable_name("a\u{1b}[31m\nb\u{9b}ü"), "a\\u{1b}[31m\\nb\\u{9b}ü");
     }
 }

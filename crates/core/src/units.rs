@@ -131,7 +131,7 @@ impl std::fmt::Display for Unit {
 }
 
 /// A length in millimetres: two decimals, more where two would hide the digits that matter.
-pub fn millimetres(metres: f64) -> String {
+pub fn format_mm(metres: f64) -> String {
     let mm = metres * 1e3;
     match mm.abs() {
         a if !a.is_finite() => "-".into(),
@@ -149,9 +149,9 @@ mod tests {
 
     #[test]
     fn small_lengths_keep_two_digits() {
-        assert_eq!(millimetres(0.123_456), "123.46");
-        assert_eq!(millimetres(0.000_034_2), "0.034");
-        assert_eq!(millimetres(0.000_003_42), "0.0034");
-        assert_eq!((millimetres(0.0), millimetres(f64::NAN)), ("0.00".into(), "-".into()));
+        assert_eq!(format_mm(0.123_456), "123.46");
+        assert_eq!(format_mm(0.000_034_2), "0.034");
+        assert_eq!(format_mm(0.000_003_42), "0.0034");
+        assert_eq!((format_mm(0.0), format_mm(f64::NAN)), ("0.00".into(), "-".into()));
     }
 }

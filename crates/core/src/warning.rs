@@ -85,7 +85,7 @@ impl std::fmt::Display for Warning {
 const LISTED: usize = 5;
 
 /// The first few names and how many more: the subject of a warning about many.
-pub fn listed(names: &[String]) -> String {
+pub fn list_names(names: &[String]) -> String {
     let shown = names[..names.len().min(LISTED)].join(", ");
     match names.len().saturating_sub(LISTED) {
         0 => shown,

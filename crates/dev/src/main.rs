@@ -31,12 +31,12 @@ fn main() -> ExitCode {
         }
     };
     ended.unwrap_or_else(|error| {
-        say(&format!("error: {error}"));
+        print_stderr(&format!("error: {error}"));
         ExitCode::from(error.exit_code())
     })
 }
 
 #[expect(clippy::print_stderr, reason = "progress and errors of the command")]
-fn say(line: &str) {
+fn print_stderr(line: &str) {
     eprintln!("{line}");
 }

@@ -1,6 +1,6 @@
 //! `armcal-dev mistakes`: runs armcal on setup mistakes and on sound sessions, and writes the table of what it said.
 
-use crate::say;
+use crate::print_stderr;
 use armcal_mistakes::judge::{self, Case};
 use armcal_mistakes::sound::{self, Sound};
 use armcal_mistakes::table::{Counts, markdown};
@@ -60,19 +60,19 @@ pub struct Request {
 
 /// Runs the suite and writes what came of it.
 pub fn run(args: &Request) -> Result<ExitCode, Error> {
-    let (kinds, rigs) = (chosen(args)?, rigs(args)?);
+    let (kinds, rigs) = (select_kinds(args)?, select_rigs(args)?);
     if args.list {
         for kind in kinds {
             let rigs: Vec<&str> = kind.rigs.iter().map(|rig| rig.word()).collect();
-            print(&format!("{:40} {:24} {}\n", kind.name, kind.cause, rigs.join(" ")));
+            print_stdout(&format!("{:40} {:24} {}\n", kind.name, kind.cause, rigs.join(" ")));
         }
         return Ok(ExitCode::SUCCESS);
     }
     if let Some(path) = &args.again {
-        let Written { cases, sound } = written(path)?;
+        let Written { cases, sound } = read_results(path)?;
         let cases: Vec<Case> = cases.into_iter().map(Case::judged_again).collect();
         let sound: Vec<Sound> = sound.into_iter().map(Sound::judged_again).collect();
-        return report(args, &cases, &sound);
+        return write_report(args, &cases, &sound);
     }
     let armcal = args.armcal.clone().or_else(beside_this).unwrap_or_else(|| "armcal".into());
     let wanted: Vec<(&Kind, Rig, u64)> = (args.seed..args.seed + args.seeds)
@@ -86,8 +86,8 @@ pub fn run(args: &Request) -> Result<ExitCode, Error> {
         let progress = Progress { done: AtomicUsize::new(0), all: wanted.len() + args.sound };
         let cases = wanted.par_iter().map(|(kind, rig, seed)| {
             let name = format!("{}-{}-{seed}", rig.word(), kind.name);
-            let case = within(args.keep.as_deref(), &name, |folder| {
-                judge::case(&armcal, kind, *rig, *seed, folder)
+            let case = run_in_folder(args.keep.as_deref(), &name, |folder| {
+                judge::run_case(&armcal, kind, *rig, *seed, folder)
             })?;
             let (reported, verdict) = (case.reported.as_deref(), case.said.verdict.as_deref());
             progress.step(&format!(
@@ -103,8 +103,8 @@ pub fn run(args: &Request) -> Result<ExitCode, Error> {
         let cases = cases.collect::<Result<_, Error>>()?;
         let sound = (args.sound_from..args.sound_from + args.sound).into_par_iter().map(|number| {
             let name = format!("sound-{number}-{}", args.seed);
-            let sound = within(args.keep.as_deref(), &name, |folder| {
-                sound::sound(&armcal, number, args.seed, folder)
+            let sound = run_in_folder(args.keep.as_deref(), &name, |folder| {
+                sound::run_session(&armcal, number, args.seed, folder)
             })?;
             progress.step(&format!("{name}: {} alarms", sound.alarms.len()));
             Ok(sound)
@@ -115,10 +115,10 @@ pub fn run(args: &Request) -> Result<ExitCode, Error> {
         Ok(pool) => pool.install(work)?,
         Err(_) => work()?,
     };
-    report(args, &cases, &sound)
+    write_report(args, &cases, &sound)
 }
 
-fn report(args: &Request, cases: &[Case], sound: &[Sound]) -> Result<ExitCode, Error> {
+fn write_report(args: &Request, cases: &[Case], sound: &[Sound]) -> Result<ExitCode, Error> {
     let command = format!(
         "cargo run --release -p armcal-dev -- mistakes --seed {} --seeds {} --sound {}",
         args.seed, args.seeds, args.sound
@@ -126,7 +126,7 @@ fn report(args: &Request, cases: &[Case], sound: &[Sound]) -> Result<ExitCode, E
     let text = markdown(cases, sound, &command);
     match &args.out {
         Some(path) => std::fs::write(path, &text).map_err(Error::file("writing", path))?,
-        None => print(&text),
+        None => print_stdout(&text),
     }
     if let Some(path) = &args.json {
         let all = serde_json::json!({ "cases": cases, "sound": sound });
@@ -134,7 +134,7 @@ fn report(args: &Request, cases: &[Case], sound: &[Sound]) -> Result<ExitCode, E
     }
     let counts = Counts::of(cases);
     let alarmed = sound.iter().filter(|s| !s.alarms.is_empty()).count();
-    say(&format!(
+    print_stderr(&format!(
         "{} cases: {} right, {} not shown, {} missed, {} false; {alarmed} of {} sound sessions with a false alarm",
         counts.cases,
         counts.right,
@@ -153,7 +153,7 @@ struct Written {
     sound: Vec<Sound>,
 }
 
-fn written(path: &Path) -> Result<Written, Error> {
+fn read_results(path: &Path) -> Result<Written, Error> {
     let bytes = std::fs::read(path).map_err(Error::file("reading", path))?;
     serde_json::from_slice(&bytes).map_err(|e| Error::File {
         doing: "reading",
@@ -162,16 +162,16 @@ fn written(path: &Path) -> Result<Written, Error> {
     })
 }
 
-fn chosen(args: &Request) -> Result<Vec<Kind>, Error> {
+fn select_kinds(args: &Request) -> Result<Vec<Kind>, Error> {
     if !args.only.is_empty() {
-        return args.only.iter().map(|name| kinds::named(name)).collect();
+        return args.only.iter().map(|name| kinds::find_kind(name)).collect();
     }
     let all = kinds();
     let n = args.kinds.unwrap_or(all.len()).clamp(1, all.len());
     Ok((0..n).map(|i| all[i * all.len() / n]).collect())
 }
 
-fn rigs(args: &Request) -> Result<Vec<Rig>, Error> {
+fn select_rigs(args: &Request) -> Result<Vec<Rig>, Error> {
     match args.rigs.is_empty() {
         true => Ok(Rig::ALL.to_vec()),
         false => args.rigs.iter().map(|word| Rig::named(word)).collect(),
@@ -179,7 +179,7 @@ fn rigs(args: &Request) -> Result<Vec<Rig>, Error> {
 }
 
 /// Works in a folder of the case's own, which is kept or not.
-fn within<T>(
+fn run_in_folder<T>(
     keep: Option<&Path>,
     name: &str,
     work: impl FnOnce(&Path) -> Result<T, Error>,
@@ -200,11 +200,11 @@ struct Progress {
 impl Progress {
     fn step(&self, what: &str) {
         let n = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        say(&format!("{n}/{} {what}", self.all));
+        print_stderr(&format!("{n}/{} {what}", self.all));
     }
 }
 
 #[expect(clippy::print_stdout, reason = "the result of the command")]
-fn print(text: &str) {
+fn print_stdout(text: &str) {
     print!("{text}");
 }

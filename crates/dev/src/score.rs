@@ -4,9 +4,15 @@ use crate::error::Error;
 use armcal::progress::Progress;
 use armcal::stdout::{print, print_json};
 use armcal_lab::LabError;
-use armcal_lab::scenario::{Design, Scenario, Size, check_family, families, nothing, outside, pairs, word};
+use armcal_lab::scenario::{
+    Design, Scenario, Size, catalogue_families, check_family, family_pairs, null_families, parse_word,
+    uncatalogued_families,
+};
 use armcal_recording::{atomic, may_write_all};
-use armcal_score::{Campaign, Judgement, Reliability, Way, laws, page, rows, score, table};
+use armcal_score::{
+    Campaign, Judgement, Reliability, Way, check_laws, confusion_page, family_rows, score_scenarios,
+    terminal_table,
+};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -52,8 +58,8 @@ pub struct Request {
 
 /// Runs the scenarios and prints the confusion table.
 pub fn run(request: &Request) -> Result<(), Error> {
-    armcal::threads::start()?;
-    let scenarios = scenarios(request)?;
+    armcal::threads::start_workers()?;
+    let scenarios = select_scenarios(request)?;
     may_write_all(&request.page).map_err(Error::Output)?;
     let whole_way = whole_way(request, &scenarios);
     let progress = Progress::new();
@@ -63,9 +69,9 @@ pub fn run(request: &Request) -> Result<(), Error> {
         progress.step(&format!("scenario {n} of {all}"));
     };
     if request.laws {
-        let laws = laws(&scenarios, &done)?;
+        let laws = check_laws(&scenarios, &done)?;
         progress.finish();
-        let text = laws.page(&command(request));
+        let text = laws.page(&page_command(request));
         if let Some(file) = &request.page {
             atomic::write(file, text.as_bytes()).map_err(Error::Output)?;
         }
@@ -73,20 +79,20 @@ pub fn run(request: &Request) -> Result<(), Error> {
     }
     let noise_factor = request.noise_factor;
     let way = if request.sealed { Way::Recorded } else { Way::Observed { noise_factor } };
-    let scored = score(&scenarios, way, &done)?;
-    let whole_way = score(&whole_way, Way::Recorded, &done)?;
+    let scored = score_scenarios(&scenarios, way, &done)?;
+    let whole_way = score_scenarios(&whole_way, Way::Recorded, &done)?;
     progress.finish();
     if let Some(file) = &request.page {
-        let command = command(request);
+        let command = page_command(request);
         let campaign = Campaign { command, scored: &scored, whole_way: &whole_way, noise_factor };
-        atomic::write(file, page(&campaign).as_bytes()).map_err(Error::Output)?;
+        atomic::write(file, confusion_page(&campaign).as_bytes()).map_err(Error::Output)?;
     }
-    let rows = rows(&scored);
+    let rows = family_rows(&scored);
     if request.json {
         let all = json!({ "rows": rows, "scenarios": scored, "whole_way": whole_way });
         print_json(&all)?;
     } else {
-        print(&table(&rows))?;
+        print(&terminal_table(&rows))?;
         let wrong = scored.iter().filter(|s| s.judgement == Judgement::Wrong).count();
         let (first, last) = (request.from, request.from + request.seeds.saturating_sub(1));
         let slowest = scored.iter().map(|s| s.answer.seconds).fold(0.0, f64::max);
@@ -100,7 +106,7 @@ pub fn run(request: &Request) -> Result<(), Error> {
     Ok(())
 }
 
-fn scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
+fn select_scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
     if !(request.noise_factor > 0.0 && request.noise_factor.is_finite()) {
         let why = format!("must be positive, is {}", request.noise_factor);
         return Err(Error::Usage(LabError::Value { key: "noise-factor".to_owned(), why }));
@@ -108,20 +114,20 @@ fn scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
     let mut names: Vec<String> = Vec::new();
     for word in &request.families {
         match word.as_str() {
-            "catalogue" => names.extend(families().into_iter().map(str::to_owned)),
-            "nothing" => names.extend(nothing().into_iter().map(str::to_owned)),
-            "pairs" => names.extend(pairs().into_iter().map(str::to_owned)),
-            "outside" => names.extend(outside().into_iter().map(str::to_owned)),
+            "catalogue" => names.extend(catalogue_families().into_iter().map(str::to_owned)),
+            "nothing" => names.extend(null_families().into_iter().map(str::to_owned)),
+            "pairs" => names.extend(family_pairs().into_iter().map(str::to_owned)),
+            "outside" => names.extend(uncatalogued_families().into_iter().map(str::to_owned)),
             name => {
                 check_family(name).map_err(Error::Usage)?;
                 names.push(name.to_owned());
             }
         }
     }
-    let size: Size = word("size", &request.size).map_err(Error::Usage)?;
+    let size: Size = parse_word("size", &request.size).map_err(Error::Usage)?;
     let mut all = Vec::new();
     for design in &request.designs {
-        let design: Design = word("design", design).map_err(Error::Usage)?;
+        let design: Design = parse_word("design", design).map_err(Error::Usage)?;
         for name in &names {
             for seed in request.from..request.from + request.seeds {
                 all.push(Scenario { size, ..Scenario::new(name, design, seed) });
@@ -134,13 +140,13 @@ fn scenarios(request: &Request) -> Result<Vec<Scenario>, Error> {
 /// The first seeds of single effects of the catalogue, again.
 fn whole_way(request: &Request, scenarios: &[Scenario]) -> Vec<Scenario> {
     let last = request.from + request.sealed_seeds.min(request.seeds);
-    let listed = families();
+    let listed = catalogue_families();
     let again = scenarios.iter().filter(|s| s.seed < last && listed.contains(&s.family.as_str()));
     again.cloned().collect()
 }
 
 /// The command that makes the page again.
-fn command(request: &Request) -> String {
+fn page_command(request: &Request) -> String {
     let mut words = vec!["cargo run --release -p armcal-dev -- score".to_owned()];
     words.extend(request.families.iter().cloned());
     if request.designs != ["free-poses"] {

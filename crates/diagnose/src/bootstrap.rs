@@ -10,7 +10,7 @@
 
 use crate::config::DiagnosisConfig;
 use crate::problem::{Columns, DwellRow};
-use crate::projection::{Gram, Projection, eigen};
+use crate::projection::{Gram, Projection, gram_eigen};
 use armcal_calibrate::tails::ln_f_tail;
 use armcal_calibrate::{Signs, gram};
 use nalgebra::{DMatrix, DVector};
@@ -35,7 +35,7 @@ pub(crate) struct Direction<'a> {
 impl<'a> Direction<'a> {
     /// From columns times a factor, and the products of these.
     pub fn new(columns: &'a Columns, factor: f64, gram: &Gram) -> Direction<'a> {
-        let (w, v) = eigen(&gram.a, gram.raw.max());
+        let (w, v) = gram_eigen(&gram.a, gram.raw.max());
         let keep: Vec<usize> = (0..w.len()).filter(|k| w[*k] > 0.0).collect();
         let mut root = DMatrix::zeros(v.nrows(), keep.len());
         for (c, k) in keep.iter().enumerate() {
@@ -128,7 +128,7 @@ pub(crate) struct Significance {
 }
 
 /// `-ln p` of the F test that a score `s` of rank `m` is noise.
-fn surprise(s: f64, m: f64, rss: f64, dof: f64) -> f64 {
+fn neg_ln_p(s: f64, m: f64, rss: f64, dof: f64) -> f64 {
     let left = (rss - s).max(1e-12 * rss) / (dof - m).max(1.0);
     -ln_f_tail(s / m / left, m, (dof - m).max(1.0))
 }
@@ -147,13 +147,13 @@ pub(crate) fn wild_cluster(
     let observed: Vec<f64> = scores
         .iter()
         .zip(&ranks)
-        .map(|(s, m)| if *m == 0 { 0.0 } else { surprise(*s, *m as f64, rss, dof) })
+        .map(|(s, m)| if *m == 0 { 0.0 } else { neg_ln_p(*s, *m as f64, rss, dof) })
         .collect();
     let mut drawn = Drawn { dwells, clusters, u: DVector::zeros(residual.len()) };
     let mut power = DMatrix::zeros(1, clusters.len());
     for (g, members) in clusters.iter().enumerate() {
         let rows: Vec<usize> = members.iter().flat_map(|d| dwells[*d].range()).collect();
-        let u = inflated(projection, &residual, &rows);
+        let u = leverage_adjusted_residual(projection, &residual, &rows);
         power[(0, g)] = u.norm_squared();
         rows.iter().zip(u.iter()).for_each(|(row, u)| drawn.u[*row] = *u);
     }
@@ -193,7 +193,7 @@ pub(crate) fn wild_cluster(
         }
     }
     let maximum: Vec<f64> = (0..config.resamplings)
-        .map(|b| top.iter().map(|(m, best)| surprise(best[b], *m as f64, 1.0, dof)).fold(0.0, f64::max))
+        .map(|b| top.iter().map(|(m, best)| neg_ln_p(best[b], *m as f64, 1.0, dof)).fold(0.0, f64::max))
         .collect();
     let p = |count: usize| (1.0 + count as f64) / (config.resamplings as f64 + 1.0);
     (0..candidates.len())
@@ -206,7 +206,11 @@ pub(crate) fn wild_cluster(
 }
 
 /// `(I - H_gg)^(-1/2) e_g`.
-fn inflated(projection: &Projection, residual: &DVector<f64>, rows: &[usize]) -> DVector<f64> {
+fn leverage_adjusted_residual(
+    projection: &Projection,
+    residual: &DVector<f64>,
+    rows: &[usize],
+) -> DVector<f64> {
     let e = DVector::from_iterator(rows.len(), rows.iter().map(|r| residual[*r]));
     let q = projection.q.select_rows(rows);
     // H_gg = V diag(h) V' has rank at most min(rows, p).

@@ -8,7 +8,7 @@
 use crate::columns::Columns;
 use crate::problem::DwellRow;
 use crate::projection::{Gram, Projection};
-use armcal_calibrate::inner;
+use armcal_calibrate::inner_product;
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 
 /// The rows of a problem, its geometry projected out.
@@ -76,7 +76,8 @@ impl<'m> ByDwell<'m> {
         let (projection, c) = (self.on_rows.projection, self.columns);
         let score = stacked.tr_mul(&self.with_residual);
         // Rows of Q' X, column by column of the base.
-        let spent: Vec<DMatrix<f64>> = self.with_geometry.iter().map(|q| inner(q, &stacked)).collect();
+        let spent: Vec<DMatrix<f64>> =
+            self.with_geometry.iter().map(|q| inner_product(q, &stacked)).collect();
         let mut at = 0;
         for (k, basis) in block.iter().zip(&functions) {
             let m = basis.ncols();
@@ -91,11 +92,11 @@ impl<'m> ByDwell<'m> {
                     for mut column in weighted.column_iter_mut() {
                         column.component_mul_assign(&self.square.column(i * c + j));
                     }
-                    let full = inner(basis, &weighted);
+                    let full = inner_product(basis, &weighted);
                     if i == j {
                         gram.raw.rows_mut(i * m, m).copy_from(&full.diagonal());
                     }
-                    let left = full - inner(&own(i), &own(j));
+                    let left = full - inner_product(&own(i), &own(j));
                     gram.a.view_mut((j * m, i * m), (m, m)).copy_from(&left.transpose());
                     gram.a.view_mut((i * m, j * m), (m, m)).copy_from(&left);
                 }

@@ -7,7 +7,7 @@
 //! geometry (Brynjarsdottir and O'Hagan 2014 on why it must be).
 
 use crate::config::DiagnosisConfig;
-use crate::drivers::{Driver, DriverKind, drivers, moments, range, standardised_joints, varies};
+use crate::drivers::{Driver, DriverKind, drivers, is_varying, mean_and_sd, range, standardised_joints};
 use crate::problem::{Columns, Problem};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -81,7 +81,7 @@ pub(crate) struct Dependences {
 impl Dependences {
     /// Of the dwells of a problem.
     pub fn of(problem: &Problem) -> Dependences {
-        Dependences { drivers: drivers(problem), smooth: smooth(problem) }
+        Dependences { drivers: drivers(problem), smooth: discrepancy_functions(problem) }
     }
 }
 
@@ -105,7 +105,7 @@ pub(crate) fn discrepancies(
 }
 
 /// The functions of each kind at the dwells.
-fn smooth(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f64>>)> {
+fn discrepancy_functions(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f64>>)> {
     let n = problem.dwells.len();
     let pose = pose_kernel(problem);
     let time: Vec<f64> = problem.dwells.iter().map(|d| d.time_s).collect();
@@ -121,7 +121,7 @@ fn smooth(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f64>>)> {
     };
     add("pose", &|i, j| pose(i, j));
     let moving: Vec<usize> = (0..problem.joints())
-        .filter(|j| varies(&problem.dwells.iter().map(|d| d.arrival[*j]).collect::<Vec<_>>()))
+        .filter(|j| is_varying(&problem.dwells.iter().map(|d| d.arrival[*j]).collect::<Vec<_>>()))
         .collect();
     if !moving.is_empty() {
         add("arrival directions", &|i, j| {
@@ -140,8 +140,8 @@ fn smooth(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f64>>)> {
             if same { 0.3 + 0.7 * pose(i, j) } else { 0.0 }
         });
     }
-    if varies(&load) {
-        let (mean, sd) = moments(&load);
+    if is_varying(&load) {
+        let (mean, sd) = mean_and_sd(&load);
         add("load", &|i, j| (load[i] - mean) * (load[j] - mean) / (sd * sd) * (0.4 + 0.6 * pose(i, j)));
     }
     all

@@ -28,7 +28,7 @@ impl View<'_> {
             name: format!("joint{}", j + 1),
             unit: Unit::Radian,
             axes: vec![format!("q{}", j + 1)],
-            columns: whitened(linear, 1, |i, _| column(&turns[i], i, j)),
+            columns: whiten_columns(linear, 1, |i, _| column(&turns[i], i, j)),
         };
         let joints: Vec<Channel> = (0..self.model.joint_count()).map(joint).collect();
         let chain = self.model.chain().parameters().iter().enumerate().filter(|(_, p)| {
@@ -39,7 +39,7 @@ impl View<'_> {
             name: p.name.clone(),
             axes: vec![p.name.clone()],
             unit: p.unit,
-            columns: whitened(linear, 1, |i, _| column(&moves[i], i, index)),
+            columns: whiten_columns(linear, 1, |i, _| column(&moves[i], i, index)),
         });
         let parameters: Vec<Channel> = parameters.collect();
         let lengths_m = self.model.lengths_m();
@@ -51,13 +51,15 @@ impl View<'_> {
             name: "lengths".to_owned(),
             axes: vec!["lengths".to_owned()],
             unit: Unit::One,
-            columns: whitened(linear, 1, grown),
+            columns: whiten_columns(linear, 1, grown),
         };
         let world = Channel {
             name: "world".to_owned(),
             axes: ["world.x", "world.y", "world.z"].map(str::to_owned).to_vec(),
             unit: Unit::Metre,
-            columns: whitened(linear, 3, |i, axis| displaced(linear, i, &Vector3::ith(axis, 1.0))),
+            columns: whiten_columns(linear, 3, |i, axis| {
+                displacement_rows(linear, i, &Vector3::ith(axis, 1.0))
+            }),
         };
         let tilts = self.tilts(linear);
         let belts = self.belts(&joints);
@@ -92,7 +94,7 @@ impl View<'_> {
                     }
                     _ => Vector3::zeros(),
                 };
-                let mut rows = displaced(linear, i, &moved);
+                let mut rows = displacement_rows(linear, i, &moved);
                 if rows.len() == 6 {
                     rows.rows_mut(3, 3).copy_from(&about);
                 }
@@ -103,7 +105,7 @@ impl View<'_> {
                 name: format!("tilt of the base{of}"),
                 axes: Vec::new(),
                 unit: Unit::Radian,
-                columns: whitened(linear, 2, rocked),
+                columns: whiten_columns(linear, 2, rocked),
             }
         };
         (0..arms.len().max(1)).map(tilt).collect()
@@ -134,7 +136,7 @@ impl View<'_> {
 }
 
 /// Whitened columns from what they do to the rows of each observation.
-fn whitened(
+fn whiten_columns(
     linear: &Linearisation,
     axes: usize,
     raw: impl Fn(usize, usize) -> DVector<f64>,
@@ -156,6 +158,6 @@ fn whitened(
 }
 
 /// What a displacement in the world [m] of what an observation measured does to its rows; it turns nothing.
-fn displaced(linear: &Linearisation, observation: usize, by_m: &Vector3<f64>) -> DVector<f64> {
+fn displacement_rows(linear: &Linearisation, observation: usize, by_m: &Vector3<f64>) -> DVector<f64> {
     linear.to_metres[observation].tr_mul(by_m)
 }

@@ -241,14 +241,14 @@ struct Turning<'c> {
 
 impl<'c> Turning<'c> {
     fn new(angle_rad: &'c Arc<Vec<f64>>, per_turn: f64) -> Turning<'c> {
-        Turning { angle_rad, per_turn, now: waves(angle_rad, per_turn), step: (0.0, Vec::new()) }
+        Turning { angle_rad, per_turn, now: sin_cos_pairs(angle_rad, per_turn), step: (0.0, Vec::new()) }
     }
 
     /// On to another multiple.
     fn turn(&mut self, per_turn: f64) {
         let step = per_turn - self.per_turn;
         if self.step.0 != step {
-            self.step = (step, waves(self.angle_rad, step));
+            self.step = (step, sin_cos_pairs(self.angle_rad, step));
         }
         for (now, [sine, cosine]) in self.now.iter_mut().zip(&self.step.1) {
             *now = [now[0] * cosine + now[1] * sine, now[1] * cosine - now[0] * sine];
@@ -261,7 +261,7 @@ impl<'c> Turning<'c> {
     }
 }
 
-fn waves(angle_rad: &[f64], per_turn: f64) -> Vec<[f64; 2]> {
+fn sin_cos_pairs(angle_rad: &[f64], per_turn: f64) -> Vec<[f64; 2]> {
     angle_rad.iter().map(|angle| <[f64; 2]>::from((per_turn * angle).sin_cos())).collect()
 }
 
@@ -283,25 +283,25 @@ impl Cut {
     }
 
     fn functions(&mut self, all: &Arc<DMatrix<f64>>, kept: &[usize]) -> Arc<DMatrix<f64>> {
-        once(&mut self.functions, all, |m| m.select_rows(kept))
+        get_or_make(&mut self.functions, all, |m| m.select_rows(kept))
     }
 
     /// A base with these rows alone.
     pub fn of(&mut self, base: &Arc<DMatrix<f64>>, rows: &[usize]) -> Arc<DMatrix<f64>> {
-        once(&mut self.bases, base, |m| m.select_rows(rows))
+        get_or_make(&mut self.bases, base, |m| m.select_rows(rows))
     }
 
     fn numbers(&mut self, all: &Arc<Vec<f64>>, kept: &[usize]) -> Arc<Vec<f64>> {
-        once(&mut self.numbers, all, |v| kept.iter().map(|i| v[*i]).collect())
+        get_or_make(&mut self.numbers, all, |v| kept.iter().map(|i| v[*i]).collect())
     }
 
     fn places(&mut self, all: &Arc<Vec<usize>>, kept: &[usize]) -> Arc<Vec<usize>> {
-        once(&mut self.places, all, |v| kept.iter().map(|i| v[*i]).collect())
+        get_or_make(&mut self.places, all, |v| kept.iter().map(|i| v[*i]).collect())
     }
 }
 
 /// What `make` makes of something shared, made once.
-fn once<T>(known: &mut Vec<[Arc<T>; 2]>, of: &Arc<T>, make: impl FnOnce(&T) -> T) -> Arc<T> {
+fn get_or_make<T>(known: &mut Vec<[Arc<T>; 2]>, of: &Arc<T>, make: impl FnOnce(&T) -> T) -> Arc<T> {
     if let Some([_, done]) = known.iter().find(|[from, _]| Arc::ptr_eq(from, of)) {
         return done.clone();
     }

@@ -5,11 +5,11 @@
 
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{BeforeAfter, Diagnosis, JudgedOn, Refitted, Tried, Unexplained, Verdict};
-use crate::next::lead;
+use crate::next::prepend_findings;
 use armcal_calibrate::{
     Calibration, DwellError, compare_heldout, error_places, repeatability_m, single_dwells,
 };
-use armcal_core::{Observation, Severity, Stage, Warning, listed};
+use armcal_core::{Observation, Severity, Stage, Warning, list_names};
 
 /// Standard deviation of the norm of an isotropic Gaussian error over its mean, `sqrt(3 pi / 8 - 1)` (Maxwell).
 const SPREAD_OF_NORM: f64 = 0.422;
@@ -46,7 +46,7 @@ impl Diagnosis {
         self.refitted = refitted.map(Box::new);
         self.settle(agrees, noise_alone);
         self.tell_unexplained(before, observations, joint_names, config);
-        lead(self, observations, joint_names);
+        prepend_findings(self, observations, joint_names);
     }
 
     /// The verdict, of what was found, whether the errors agree with nothing missing, and whether they are no larger than noise
@@ -152,7 +152,7 @@ fn errs_more(
     let message = format!(
         "{} predicts dwells that were left out place by place, but on this hold-out it {}: what it predicts does not reach \
          there, or a turn leaves out what it acts in; another hold-out (`[holdout]`) may tell",
-        listed(&names),
+        list_names(&names),
         held.change_text()
     );
     let subject = names.join(" + ");

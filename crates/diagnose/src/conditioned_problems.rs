@@ -189,7 +189,7 @@ impl<'a> ConditionedProblems<'a> {
 
     /// The conditioned problem with these effects in the base.
     pub fn with(&mut self, accepted: &[Candidate]) -> Result<Rc<ConditionedProblem>, DiagnoseError> {
-        let names = names(accepted);
+        let names = sorted_specs(accepted);
         if let Some(conditioned) = self.known(&names) {
             return Ok(conditioned);
         }
@@ -232,7 +232,7 @@ impl<'a> ConditionedProblems<'a> {
 
     /// The score of a refit with these effects, in the exam of a conditioned problem; none where they cannot be fitted.
     pub fn score(&mut self, accepted: &[Candidate], conditioned: &ConditionedProblem) -> Option<Score> {
-        let key = (names(accepted), conditioned.scatter.remembers());
+        let key = (sorted_specs(accepted), conditioned.scatter.remembers());
         if let Some(known) = self.scores.get(&key) {
             return known.clone();
         }
@@ -255,7 +255,7 @@ impl<'a> ConditionedProblems<'a> {
         conditioned: &ConditionedProblem,
         score: Option<Score>,
     ) {
-        self.scores.insert((names(accepted), conditioned.scatter.remembers()), score);
+        self.scores.insert((sorted_specs(accepted), conditioned.scatter.remembers()), score);
     }
 
     /// A problem without the dwells that do not count.
@@ -281,7 +281,7 @@ impl<'a> ConditionedProblems<'a> {
     fn bare(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
         let (shapes, named): (Vec<Candidate>, Vec<Candidate>) =
             accepted.iter().cloned().partition(|c| c.family == UNLISTED);
-        let problem = match self.known(&names(&named)) {
+        let problem = match self.known(&sorted_specs(&named)) {
             Some(conditioned) => conditioned.problem.clone(),
             None => {
                 let problem = self.refit.problem(&named)?;
@@ -301,7 +301,7 @@ fn with_shapes(problem: Problem, shapes: &[Candidate]) -> Problem {
 }
 
 /// What a base with these is known by, in whatever order they came.
-fn names(accepted: &[Candidate]) -> Vec<String> {
+fn sorted_specs(accepted: &[Candidate]) -> Vec<String> {
     let mut names: Vec<String> = accepted.iter().map(|c| c.spec.clone()).collect();
     names.sort_unstable();
     names

@@ -1,7 +1,7 @@
 //! What cannot be told apart (notes 3 and 4.12, formula 10), and what the data could not have shown (4.1).
 
 use crate::problem::{Columns, Problem};
-use crate::projection::{Gram, Projection, eigen};
+use crate::projection::{Gram, Projection, gram_eigen};
 use armcal_calibrate::tails::{Z_80, Z_975};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -34,7 +34,7 @@ pub(crate) fn one_step(gram: &Gram, variance: f64) -> OneStep {
 /// `sqrt(lambda*) / |G~ v|`, `lambda* = (z(1 - alpha/2K) + z(0.8))^2`, v the typical direction.
 pub(crate) fn smallest_seen(gram: &Gram, variance: f64, count: usize) -> f64 {
     let z = Normal::standard().inverse_cdf(1.0 - 0.01 / (2.0 * count.max(1) as f64));
-    let (w, _) = eigen(&gram.a, gram.raw.max());
+    let (w, _) = gram_eigen(&gram.a, gram.raw.max());
     let size = w.sum() / w.len().max(1) as f64;
     if size > 0.0 { (z + Z_80) * (variance / size).sqrt() } else { f64::INFINITY }
 }
@@ -51,7 +51,7 @@ struct Reach(DVector<f64>, DMatrix<f64>);
 impl Reach {
     /// Of columns, by their products.
     fn of(gram: &Gram) -> Reach {
-        let (w, v) = eigen(&gram.a, gram.raw.max());
+        let (w, v) = gram_eigen(&gram.a, gram.raw.max());
         Reach(w, v)
     }
 

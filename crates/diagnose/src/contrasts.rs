@@ -1,7 +1,7 @@
 //! Paired contrasts: two visits to one pose that differ in a driver carry no geometry (notes 4.9).
 
 use crate::config::DiagnosisConfig;
-use crate::events::moment;
+use crate::events::event_since;
 use crate::problem::{Candidate, DwellRow, Problem};
 use armcal_model::Toggle;
 use nalgebra::{DMatrix, DVector};
@@ -83,9 +83,10 @@ pub(crate) fn contrast(
 /// alone.
 fn pairs(problem: &Problem, candidate: &Candidate, config: &DiagnosisConfig) -> Vec<(usize, usize)> {
     let limit = config.same_pose_deg.to_radians();
-    let moment = moment(&candidate.spec);
+    let moment = event_since(&candidate.spec);
     let differs = |a: &DwellRow, b: &DwellRow| {
-        differs(a, b, candidate.toggle) && moment.is_none_or(|since| since.holds(a.id) != since.holds(b.id))
+        toggle_differs(a, b, candidate.toggle)
+            && moment.is_none_or(|since| since.holds(a.id) != since.holds(b.id))
     };
     let mut used = vec![false; problem.dwells.len()];
     let mut found = Vec::new();
@@ -116,7 +117,7 @@ fn same_place(a: &DwellRow, b: &DwellRow, limit: f64) -> bool {
         }
 }
 
-fn differs(a: &DwellRow, b: &DwellRow, toggle: Toggle) -> bool {
+fn toggle_differs(a: &DwellRow, b: &DwellRow, toggle: Toggle) -> bool {
     match toggle {
         Toggle::Direction | Toggle::Approach => a.arrival.iter().zip(&b.arrival).any(|(a, b)| a * b < 0.0),
         Toggle::Load => (a.load_kg - b.load_kg).abs() > 1e-6,

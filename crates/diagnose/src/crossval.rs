@@ -5,7 +5,7 @@
 //! itself sees (the pose of its own board) is fitted to the group afterwards, as a user would have to.
 
 use crate::config::DiagnosisConfig;
-use crate::places::units;
+use crate::places::independent_units;
 use crate::problem::{DwellRow, Problem};
 use crate::projection::cholesky_upper;
 use armcal_calibrate::{HeldOut, gram, grouped_ci95};
@@ -37,7 +37,10 @@ impl From<Vec<usize>> for Group {
 /// Dwells by place, or by neighbourhood in joint space where places are few or do not repeat.
 pub(crate) fn by_place(problem: &Problem) -> Vec<Group> {
     let mut groups: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    units(problem).into_iter().enumerate().for_each(|(i, unit)| groups.entry(unit).or_default().push(i));
+    independent_units(problem)
+        .into_iter()
+        .enumerate()
+        .for_each(|(i, unit)| groups.entry(unit).or_default().push(i));
     groups.into_values().map(Group::from).collect()
 }
 
@@ -107,7 +110,7 @@ pub(crate) fn fitted_and_left_out(
     }
     let total: Vec<f64> = x.column_iter().map(|c| c.norm_squared()).collect();
     let factor = cholesky_upper(normal.clone());
-    let beta_all = solve(&factor, &right);
+    let beta_all = solve_cholesky(&factor, &right);
     let out = &problem.residual - &x * &beta_all;
     let mut predicted = out.clone();
     for group in groups {
@@ -121,7 +124,7 @@ pub(crate) fn fitted_and_left_out(
         let left = by_hat.unwrap_or_else(|| {
             let e_g = problem.residual.select_rows(&rows);
             let factor = cholesky_upper(&normal - x_g.tr_mul(&x_g));
-            let beta = solve(&factor, &(&right - x_g.tr_mul(&e_g)));
+            let beta = solve_cholesky(&factor, &(&right - x_g.tr_mul(&e_g)));
             let mut left = e_g - &x_g * beta;
             if !own.is_empty() && own.len() < rows.len() {
                 let q = x_g.select_columns(&own).qr().q();
@@ -150,7 +153,7 @@ fn without_by_hat(
 }
 
 /// The solution of a symmetric system of which `upper` is the Cholesky factor; a singular one is left as it is.
-pub(crate) fn solve(upper: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+pub(crate) fn solve_cholesky(upper: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     let half = upper.tr_solve_upper_triangular(right).unwrap_or_else(|| right.clone());
     upper.solve_upper_triangular(&half).unwrap_or(half)
 }
@@ -171,7 +174,7 @@ pub(crate) fn errors_m(problem: &Problem, rows: &DVector<f64>) -> Vec<DwellError
 }
 
 /// Compares two sets of left-out whitened rows group by group.
-pub(crate) fn compare(
+pub(crate) fn compare_left_out(
     problem: &Problem,
     before: &DVector<f64>,
     after: &DVector<f64>,

@@ -10,7 +10,7 @@ use crate::config::DiagnosisConfig;
 use crate::diagnosis::UnknownReport;
 use crate::problem::Candidate;
 use crate::ripple::Peak;
-use crate::unknown::described;
+use crate::unknown::describe_unlisted;
 use crate::weigh::Outside;
 
 /// A joint's own error curve.
@@ -36,7 +36,7 @@ pub(crate) fn error_curves(
         if shapes.len() >= conditioned.problem.joints() || (!shapes.is_empty() && explained()) {
             break;
         }
-        let Some(best) = leading(&conditioned, &shapes, config) else { break };
+        let Some(best) = leading_curve(&conditioned, &shapes, config) else { break };
         shapes.push(as_candidate(&best.what, &conditioned, config));
     }
     let mut curves = Vec::new();
@@ -46,7 +46,7 @@ pub(crate) fn error_curves(
         let conditioned = conditioned_problems.with(&base)?;
         let own = conditioned.weighed.unlisted.iter().filter(|u| u.what.name == shape.spec);
         let best = own.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
-        if let Some(report) = best.and_then(|u| described(&conditioned, u, config)) {
+        if let Some(report) = best.and_then(|u| describe_unlisted(&conditioned, u, config)) {
             curves.push(Curve { candidate: shape.clone(), report });
         }
     }
@@ -65,7 +65,7 @@ fn share_ripples(curves: &mut [Curve]) {
 }
 
 /// The best joint over its own angle that predicts; the first must be as good as the best cell of all.
-fn leading<'r>(
+fn leading_curve<'r>(
     conditioned: &'r ConditionedProblem,
     taken: &[Candidate],
     config: &DiagnosisConfig,

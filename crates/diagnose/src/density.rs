@@ -60,7 +60,7 @@ impl Kind {
                     let d = &problem.dwells[*i];
                     let own = left_out.rows(d.first_row, d.rows).into_owned();
                     let parts = d.parts.iter().filter(|part| part.tracked == tracked);
-                    parts.map(|part| axes(part, &own)).collect::<Vec<_>>()
+                    parts.map(|part| principal_axis_errors(part, &own)).collect::<Vec<_>>()
                 };
                 dwells.iter().flat_map(of).collect()
             })
@@ -93,7 +93,7 @@ impl Kind {
 /// Error along each axis of the declared covariance [m], and its declared variance [m^2].
 type Axes = Vec<(f64, f64)>;
 
-fn axes(part: &Part, rows: &DVector<f64>) -> Axes {
+fn principal_axis_errors(part: &Part, rows: &DVector<f64>) -> Axes {
     let error_m = &part.metres * rows;
     let covariance_m2 = &part.metres * part.metres.transpose();
     let decomposed = covariance_m2.symmetric_eigen();

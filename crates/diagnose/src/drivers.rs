@@ -73,18 +73,18 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     let column = |f: &dyn Fn(&crate::DwellRow) -> f64| -> Vec<f64> { problem.dwells.iter().map(f).collect() };
     let mut all = Vec::new();
     for j in 0..joints {
-        all.extend(smooth(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Smooth));
+        all.extend(smooth_driver(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Smooth));
     }
     for j in 0..joints {
-        all.extend(smooth(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Own(j)));
+        all.extend(smooth_driver(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Own(j)));
     }
     for j in 1..joints.saturating_sub(1) {
         let value = column(&|d| d.joint_rad[j] + d.joint_rad[j + 1]);
-        all.extend(smooth(format!("q{}+q{}", j + 1, j + 2), value, DriverKind::Smooth));
+        all.extend(smooth_driver(format!("q{}+q{}", j + 1, j + 2), value, DriverKind::Smooth));
     }
-    all.extend(smooth("t".to_string(), column(&|d| d.time_s), DriverKind::Time));
+    all.extend(smooth_driver("t".to_string(), column(&|d| d.time_s), DriverKind::Time));
     let temperatures: Option<Vec<f64>> = problem.dwells.iter().map(|d| d.temperature_c).collect();
-    all.extend(temperatures.and_then(|v| smooth("temperature".to_string(), v, DriverKind::Smooth)));
+    all.extend(temperatures.and_then(|v| smooth_driver("temperature".to_string(), v, DriverKind::Smooth)));
     let standard = standardised_joints(problem);
     let with_pose = |value: &[f64]| {
         DMatrix::from_fn(value.len(), joints + 1, |i, k| {
@@ -93,15 +93,15 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     };
     for j in 0..joints {
         let value = column(&|d| d.arrival[j]);
-        if varies(&value) {
+        if is_varying(&value) {
             let basis = with_pose(&value);
             all.push(Driver::switched(&format!("s{}", j + 1), DriverKind::Direction(j), value, basis));
             all.extend(direction_along(problem, j));
         }
     }
     let load = column(&|d| d.load_kg);
-    if varies(&load) {
-        let (mean, sd) = moments(&load);
+    if is_varying(&load) {
+        let (mean, sd) = mean_and_sd(&load);
         let basis = with_pose(&load.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>());
         all.push(Driver::switched("load", DriverKind::Load, load, basis));
     }
@@ -119,7 +119,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
 fn direction_along(problem: &Problem, joint: usize) -> Option<Driver> {
     let angle = problem.dwells.iter().map(|d| d.joint_rad[joint]).collect();
     let (name, kind) = (format!("s{0}*q{0}", joint + 1), DriverKind::DirectionAlong(joint));
-    let mut driver = smooth(name, angle, kind)?;
+    let mut driver = smooth_driver(name, angle, kind)?;
     for (d, mut row) in problem.dwells.iter().zip(Arc::make_mut(&mut driver.basis).row_iter_mut()) {
         row *= d.arrival[joint];
     }
@@ -131,13 +131,13 @@ pub(crate) fn standardised_joints(problem: &Problem) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(problem.dwells.len(), problem.joints());
     for j in 0..problem.joints() {
         let value: Vec<f64> = problem.dwells.iter().map(|d| d.joint_rad[j]).collect();
-        let (mean, sd) = moments(&value);
+        let (mean, sd) = mean_and_sd(&value);
         (0..value.len()).for_each(|i| all[(i, j)] = if sd > 1e-9 { (value[i] - mean) / sd } else { 0.0 });
     }
     all
 }
 
-pub(crate) fn varies(value: &[f64]) -> bool {
+pub(crate) fn is_varying(value: &[f64]) -> bool {
     value.iter().any(|v| (v - value[0]).abs() > 1e-9 * (1.0 + value[0].abs()))
 }
 
@@ -148,14 +148,14 @@ pub(crate) fn range(value: &[f64]) -> (f64, f64) {
 }
 
 /// Mean and standard deviation.
-pub(crate) fn moments(value: &[f64]) -> (f64, f64) {
+pub(crate) fn mean_and_sd(value: &[f64]) -> (f64, f64) {
     let n = value.len().max(1) as f64;
     let mean = value.iter().sum::<f64>() / n;
     (mean, (value.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
 }
 
-fn smooth(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driver> {
-    if !varies(&value) {
+fn smooth_driver(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driver> {
+    if !is_varying(&value) {
         return None;
     }
     let (lengths, bins, functions) = match kind {
@@ -202,7 +202,7 @@ impl Kernel {
         // What it is worth depends on the distance alone.
         let apart: Vec<f64> = grid.iter().map(|g| kernel(g - grid[0], lengths)).collect();
         let k = DMatrix::from_fn(bins, bins, |i, j| root[i] * root[j] * apart[i.abs_diff(j)]);
-        let (worth, vectors) = eigen(k);
+        let (worth, vectors) = low_rank_eigen(k);
         let mut order: Vec<usize> = (0..worth.len()).collect();
         order.sort_by(|a, b| worth[*b].total_cmp(&worth[*a]));
         let keep: Vec<usize> = order.into_iter().take(functions).filter(|k| worth[*k] > 1e-6).collect();
@@ -228,8 +228,8 @@ impl Kernel {
 
 /// Eigenvalues and -vectors of a positive matrix, those of no worth left out where few have any: with `K = L L'` and
 /// `L'L v = w v` they are `w` and `L v / sqrt(w)`, which are those of a much smaller matrix.
-fn eigen(k: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
-    let Some(factor) = factor(&k) else {
+fn low_rank_eigen(k: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let Some(factor) = pivoted_cholesky(&k) else {
         let whole = k.symmetric_eigen();
         return (whole.eigenvalues, whole.eigenvectors);
     };
@@ -243,7 +243,7 @@ fn eigen(k: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
 
 /// `L` of `K = L L'` to rounding, by Cholesky's method with the largest pivot first; none of more than half as many columns
 /// as rows, which would save nothing.
-fn factor(k: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+fn pivoted_cholesky(k: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let most = k.nrows() / 2;
     let (mut left, mut factor) = (k.diagonal(), DMatrix::zeros(k.nrows(), most));
     let rounding = f64::EPSILON * left.sum();

@@ -3,7 +3,7 @@
 use crate::config::DiagnosisConfig;
 use crate::grams::each_gram;
 use crate::problem::{Columns, Problem};
-use crate::projection::{Gram, Projection, cholesky_upper, eigen};
+use crate::projection::{Gram, Projection, cholesky_upper, gram_eigen};
 use armcal_calibrate::tails::ln_sum_exp;
 use nalgebra::{DMatrix, DVector};
 
@@ -13,12 +13,12 @@ const EIGEN_COLUMNS: usize = 12;
 /// What columns promise to explain, before they are weighed in full: from `[x_k' r, |x_k|^2]` of each column and the
 /// residual, both whitened, `sum_k (x_k' r)^2 / (1 + |x_k|^2)`, the fall of the squared residual if they were independent
 /// and the geometry took nothing of them over.
-pub(crate) fn promise(columns: impl Iterator<Item = [f64; 2]>) -> f64 {
+pub(crate) fn screening_score(columns: impl Iterator<Item = [f64; 2]>) -> f64 {
     columns.map(|[with_residual, square]| with_residual.powi(2) / (1.0 + square)).sum()
 }
 
 /// A problem whose residual noise is `scale` times the declared one, its geometry projected out.
-pub(crate) fn projected(problem: &Problem, scale: f64) -> Projection {
+pub(crate) fn project_out_geometry(problem: &Problem, scale: f64) -> Projection {
     let (precision, offset) = (&problem.geometry_precision, &problem.geometry_offset);
     Projection::new(&problem.geometry / scale, precision, offset, &problem.residual / scale)
 }
@@ -46,14 +46,14 @@ fn of_amplitudes(gram: &Gram, base: &Projection, config: &DiagnosisConfig) -> Ve
         let left = (rss - drop).max(1e-9 * rss);
         -0.5 * ln_det - 0.5 * (nu0 + dof) * ((nu0 + left) / (nu0 + rss)).ln()
     };
-    penalised(gram, &config.amplitude_scales).into_iter().map(of).collect()
+    ln_det_and_drop(gram, &config.amplitude_scales).into_iter().map(of).collect()
 }
 
 /// For each amplitude: `ln det(I + a^2 A)` and `g'(A + a^-2 I)^-1 g`.
-fn penalised(gram: &Gram, scales: &[f64]) -> Vec<(f64, f64)> {
+fn ln_det_and_drop(gram: &Gram, scales: &[f64]) -> Vec<(f64, f64)> {
     let m = gram.g.len();
     if m <= EIGEN_COLUMNS {
-        let (w, v) = eigen(&gram.a, gram.raw.max());
+        let (w, v) = gram_eigen(&gram.a, gram.raw.max());
         let t = v.tr_mul(&gram.g);
         let at = |a: &f64| {
             let ln_det = w.iter().map(|w| (1.0 + a * a * w).ln()).sum();
@@ -93,7 +93,7 @@ pub(crate) fn of_all(
 }
 
 /// Posterior mean and covariance (noise variance 1) of a term's coefficients at amplitude `a`.
-pub(crate) fn coefficients(gram: &Gram, a: f64) -> (DVector<f64>, DMatrix<f64>) {
+pub(crate) fn posterior_coefficients(gram: &Gram, a: f64) -> (DVector<f64>, DMatrix<f64>) {
     let mut m = gram.a.clone();
     (0..m.nrows()).for_each(|k| m[(k, k)] += 1.0 / (a * a));
     let factor = cholesky_upper(m);

@@ -2,8 +2,8 @@
 
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Expression, ExpressionParameter};
-use crate::drivers::{Driver, DriverKind, moments, range};
-use crate::evidence::{best_amplitude, coefficients, of_all};
+use crate::drivers::{Driver, DriverKind, mean_and_sd, range};
+use crate::evidence::{best_amplitude, of_all, posterior_coefficients};
 use crate::problem::{Channel, Columns, Problem};
 use crate::weigh::Weighed;
 use nalgebra::DMatrix;
@@ -25,7 +25,7 @@ struct Family {
 
 /// Fits every family on one axis of a channel and returns the formula with the largest evidence; its
 /// `share_of_shape` is still the fall of the squared residual.
-pub(crate) fn expression(
+pub(crate) fn fit_expression(
     problem: &Problem,
     weighed: &Weighed,
     channel: &Channel,
@@ -59,7 +59,7 @@ pub(crate) fn expression(
     let (family, unit, columns) = &families[best];
     let gram = base.gram(&weighed.dense(columns, problem));
     let a = best_amplitude(&gram, base, config);
-    let (theta, _) = coefficients(&gram, a);
+    let (theta, _) = posterior_coefficients(&gram, a);
     let parameters = family
         .terms
         .iter()
@@ -88,11 +88,11 @@ fn families(problem: &Problem, driver: &Driver) -> Vec<Family> {
         DriverKind::Smooth | DriverKind::Own(_) => smooth_families(&driver.name, driver, false),
         DriverKind::Time => smooth_families(&driver.name, driver, true),
         DriverKind::Direction(_) => with_pose(problem, &driver.name, &driver.value),
-        DriverKind::DirectionAlong(joint) => along(problem, driver, joint),
+        DriverKind::DirectionAlong(joint) => direction_families(problem, driver, joint),
         DriverKind::Load => {
-            let (mean, _) = moments(&driver.value);
+            let (mean, _) = mean_and_sd(&driver.value);
             let value: Vec<f64> = driver.value.iter().map(|v| v - mean).collect();
-            with_pose(problem, &standard("load", mean, 1.0), &value)
+            with_pose(problem, &standardised_term("load", mean, 1.0), &value)
         }
         DriverKind::Recording => Vec::new(),
     }
@@ -105,7 +105,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
     let x = if name.contains('+') { format!("({name})") } else { name.to_owned() };
     // Every parameter then has the channel's unit: the numbers carry the driver's.
-    let shifted = standard(&x, centre, half);
+    let shifted = standardised_term(&x, centre, half);
     let mut all = Vec::new();
     let rows = value.len();
     for degree in 1..=5usize {
@@ -119,7 +119,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
     let mut harmonic = |frequencies: &[f64], tried: f64| {
         let mut terms = Vec::new();
         for (k, f) in frequencies.iter().enumerate() {
-            let inner = if *f == 1.0 { x.clone() } else { format!("{}*{x}", number(*f)) };
+            let inner = if *f == 1.0 { x.clone() } else { format!("{}*{x}", format_number(*f)) };
             terms.push((format!("a{}", k + 1), format!("a{}*sin({inner})", k + 1)));
             terms.push((format!("b{}", k + 1), format!("b{}*cos({inner})", k + 1)));
         }
@@ -157,7 +157,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
         let c = centre + half * (-0.7 + 0.1 * f64::from(place));
         for width in [0.05, 0.1, 0.2, 0.4] {
             let w = half * width;
-            let u = standard(&x, c, w);
+            let u = standardised_term(&x, c, w);
             shaped(format!("tanh{u}"), &|v| ((v - c) / w).tanh(), 120.0);
             shaped(format!("exp(-({u}^2))"), &|v| (-((v - c) / w).powi(2)).exp(), 120.0);
         }
@@ -165,7 +165,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
     if time {
         for part in [0.05, 0.1, 0.2, 0.4, 0.8] {
             let constant = 2.0 * half * part;
-            let inner = format!("(1 - exp(-{x}/{}))", number(constant));
+            let inner = format!("(1 - exp(-{x}/{}))", format_number(constant));
             shaped(inner, &|v| 1.0 - (-v / constant).exp(), 5.0);
         }
     }
@@ -173,7 +173,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
 }
 
 /// A direction alone, and alone plus each smooth family of the angle times it.
-fn along(problem: &Problem, driver: &Driver, joint: usize) -> Vec<Family> {
+fn direction_families(problem: &Problem, driver: &Driver, joint: usize) -> Vec<Family> {
     let sign = format!("s{}", joint + 1);
     let arrival = |i: usize| problem.dwells[i].arrival[joint];
     let with_sign = |family: Family| {
@@ -201,9 +201,9 @@ fn with_pose(problem: &Problem, name: &str, value: &[f64]) -> Vec<Family> {
     let mut joints = Vec::new();
     for j in 0..problem.joints() {
         let q: Vec<f64> = problem.dwells.iter().map(|d| d.joint_rad[j]).collect();
-        let (mean, sd) = moments(&q);
+        let (mean, sd) = mean_and_sd(&q);
         if sd > 1e-6 {
-            let inner = standard(&format!("q{}", j + 1), mean, sd);
+            let inner = standardised_term(&format!("q{}", j + 1), mean, sd);
             terms.push((format!("c{}", j + 1), format!("c{}*{name}*{inner}", j + 1)));
             joints.push((j, mean, sd));
         }
@@ -226,13 +226,13 @@ fn with_pose(problem: &Problem, name: &str, value: &[f64]) -> Vec<Family> {
 }
 
 /// `((x - centre)/width)`.
-fn standard(x: &str, centre: f64, width: f64) -> String {
+fn standardised_term(x: &str, centre: f64, width: f64) -> String {
     let (sign, size) = if centre < 0.0 { ('+', -centre) } else { ('-', centre) };
-    format!("(({x} {sign} {})/{})", number(size), number(width))
+    format!("(({x} {sign} {})/{})", format_number(size), format_number(width))
 }
 
 /// Six digits: a constant of a formula, not a result.
-fn number(value: f64) -> String {
+fn format_number(value: f64) -> String {
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text.is_empty() || text == "-0" { "0".to_string() } else { text.to_string() }

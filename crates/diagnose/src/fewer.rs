@@ -7,29 +7,29 @@
 use crate::DiagnoseError;
 use crate::conditioned_problems::ConditionedProblems;
 use crate::config::DiagnosisConfig;
-use crate::forward::{Accepted, named};
+use crate::forward::{Accepted, accepted_candidates};
 use crate::problem::Candidate;
 use crate::search::{Found, going_on};
 
 /// The same with one name for several of a target, wherever that says as much.
-pub(crate) fn fewer(
+pub(crate) fn merge_names(
     conditioned_problems: &mut ConditionedProblems<'_>,
     mut found: Found,
     config: &DiagnosisConfig,
 ) -> Result<Found, DiagnoseError> {
-    while let Some(simpler) = simpler(conditioned_problems, &found.accepted, config)? {
+    while let Some(simpler) = merge_first_target(conditioned_problems, &found.accepted, config)? {
         found = simpler;
     }
     Ok(found)
 }
 
 /// With one name for several of the first target for which that says as much; none where there is no such target.
-fn simpler(
+fn merge_first_target(
     conditioned_problems: &mut ConditionedProblems<'_>,
     accepted: &[Accepted],
     config: &DiagnosisConfig,
 ) -> Result<Option<Found>, DiagnoseError> {
-    let names = named(accepted);
+    let names = accepted_candidates(accepted);
     let mut targets: Vec<&str> = names.iter().map(|c| c.target.as_str()).collect();
     targets.sort_unstable();
     targets.dedup();

@@ -3,7 +3,7 @@
 use crate::DiagnoseError;
 use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
-use crate::events::moved;
+use crate::events::is_same_event;
 use crate::judge::{Grade, Judged};
 use crate::problem::{Candidate, Problem};
 use crate::score::Score;
@@ -56,7 +56,9 @@ impl Accepted {
     pub fn leads(&self, config: &DiagnosisConfig) -> bool {
         let detail = self.judged.detail(config);
         let own = &self.judged.score;
-        leading(&self.conditioned, config).first().is_none_or(|(_, best)| !best.above(own).is_clear(detail))
+        leading_entries(&self.conditioned, config)
+            .first()
+            .is_none_or(|(_, best)| !best.above(own).is_clear(detail))
     }
 }
 
@@ -88,12 +90,12 @@ impl Step {
 }
 
 /// Their candidates.
-pub(crate) fn named(accepted: &[Accepted]) -> Vec<Candidate> {
+pub(crate) fn accepted_candidates(accepted: &[Accepted]) -> Vec<Candidate> {
     accepted.iter().map(|a| a.candidate.clone()).collect()
 }
 
 /// Steps that were confirmed before, with the problem that they leave.
-pub(crate) fn known(names: &[Candidate], rest: &ConditionedProblem) -> Vec<Step> {
+pub(crate) fn confirmed_steps(names: &[Candidate], rest: &ConditionedProblem) -> Vec<Step> {
     names.iter().map(|c| Step::known(c.clone(), rest.weighed.base.rss)).collect()
 }
 
@@ -139,7 +141,7 @@ pub(crate) fn confirm(
                 ranked: Vec::new(),
             });
         }
-        match gone.or_else(|| weakest(&judged)).or_else(|| detail(&judged, config)) {
+        match gone.or_else(|| weakest(&judged)).or_else(|| find_shape_detail(&judged, config)) {
             Some(k) => drop(steps.remove(k)),
             None => return Ok(judged),
         }
@@ -154,7 +156,7 @@ fn weakest(judged: &[Accepted]) -> Option<usize> {
 }
 
 /// What is no more than the detail of another one's shape: it is no effect.
-fn detail(judged: &[Accepted], config: &DiagnosisConfig) -> Option<usize> {
+fn find_shape_detail(judged: &[Accepted], config: &DiagnosisConfig) -> Option<usize> {
     let most = judged.iter().map(|a| a.judged.gain.nats).fold(0.0, f64::max);
     judged.iter().position(|a| a.judged.gain.nats < config.leftover_share * most)
 }
@@ -169,12 +171,17 @@ fn entry_of(weighed: &Weighed, candidate: &Candidate) -> Option<usize> {
             other.family == candidate.family && other.target == candidate.target
         };
         let entry = weighed.ranking().into_iter().find(alike);
-        entry.or_else(|| weighed.entries.iter().position(|e| moved(&candidate.spec, &e.candidate.spec)))
+        entry.or_else(|| {
+            weighed.entries.iter().position(|e| is_same_event(&candidate.spec, &e.candidate.spec))
+        })
     })
 }
 
 /// Entries that the weighing likes best, each name once, with their scores: those first that are worth most.
-pub(crate) fn leading(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Vec<(usize, Score)> {
+pub(crate) fn leading_entries(
+    conditioned: &ConditionedProblem,
+    config: &DiagnosisConfig,
+) -> Vec<(usize, Score)> {
     let weighed = &conditioned.weighed;
     let mut names: Vec<usize> = Vec::new();
     for k in weighed.ranking() {
@@ -188,7 +195,7 @@ pub(crate) fn leading(conditioned: &ConditionedProblem, config: &DiagnosisConfig
 }
 
 /// Accepts the best candidate again and again while it is promising. `cells` stay in the base.
-pub(crate) fn forward(
+pub(crate) fn forward_selection(
     conditioned_problems: &mut ConditionedProblems<'_>,
     mut steps: Vec<Step>,
     cells: &[Candidate],
@@ -255,7 +262,9 @@ fn next_step(
     config: &DiagnosisConfig,
 ) -> Result<Next, DiagnoseError> {
     let weighed = &conditioned.weighed;
-    let Some((top, _)) = leading(conditioned, config).into_iter().next() else { return Ok(Next::End) };
+    let Some((top, _)) = leading_entries(conditioned, config).into_iter().next() else {
+        return Ok(Next::End);
+    };
     let mut judged = conditioned.judge(top, config);
     let mut named = judged.grade(config) == Grade::Named;
     let entry = &weighed.entries[judged.entry];

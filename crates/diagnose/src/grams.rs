@@ -7,7 +7,7 @@ use crate::by_dwell::{ByDwell, OnRows};
 use crate::columns::Columns;
 use crate::problem::Problem;
 use crate::projection::{Gram, Projection};
-use armcal_calibrate::inner;
+use armcal_calibrate::inner_product;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -47,7 +47,7 @@ pub(crate) fn each_gram(
         }
     }
     for block in blocks(terms, &rest, problem.rows()) {
-        dense(terms, block, problem, factor, projection, each);
+        dense_grams(terms, block, problem, factor, projection, each);
     }
 }
 
@@ -68,7 +68,7 @@ fn blocks<'k>(terms: &[&Columns], which: &'k [usize], height: usize) -> Vec<&'k 
 }
 
 /// Row by row.
-fn dense(
+fn dense_grams(
     terms: &[&Columns],
     block: &[usize],
     problem: &Problem,
@@ -83,15 +83,15 @@ fn dense(
         t.write(&problem.dwells, factor, stacked.columns_mut(at, t.len()));
         at += t.len();
     }
-    let spent = inner(&projection.q, &stacked);
+    let spent = inner_product(&projection.q, &stacked);
     let score = stacked.tr_mul(&projection.residual) - spent.tr_mul(&projection.z);
     let mut at = 0;
     for k in block {
         let m = terms[*k].len();
         let (x, c) = (stacked.columns(at, m), spent.columns(at, m));
-        let full = inner(&x, &x);
+        let full = inner_product(&x, &x);
         let raw = full.diagonal();
-        let (a, g) = (full - inner(&c, &c), score.rows(at, m).into_owned());
+        let (a, g) = (full - inner_product(&c, &c), score.rows(at, m).into_owned());
         let gram = Gram { raw, a, g, spent: c.into_owned() };
         each(*k, &gram);
         at += m;

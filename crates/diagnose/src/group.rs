@@ -1,7 +1,7 @@
 //! One family at all joints together: a cause that is likely to be in every joint, such as a make of gear.
 
 use crate::columns::Functions;
-use crate::evidence::promise;
+use crate::evidence::screening_score;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Scan};
 use armcal_model::{Offered, catalogue};
 use nalgebra::{DVector, DVectorView};
@@ -20,7 +20,7 @@ pub(crate) fn with_groups(mut all: Vec<Candidate>) -> Vec<Candidate> {
         if members.len() < 2 {
             continue;
         }
-        let group = grouped(&members);
+        let group = combine_members(&members);
         all.push(group);
     }
     all
@@ -43,7 +43,8 @@ pub(crate) fn one_frequency(scans: &[Scan], dwells: &[DwellRow], residual: &DVec
     };
     let mut tried: Vec<(f64, Vec<&Point<'_>>)> = finest.iter().filter_map(|p| at(p.frequency)).collect();
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let group = |members: Vec<&Point<'_>>| grouped(&members.iter().map(|p| p.candidate).collect::<Vec<_>>());
+    let group =
+        |members: Vec<&Point<'_>>| combine_members(&members.iter().map(|p| p.candidate).collect::<Vec<_>>());
     let points: Vec<Candidate> = tried.into_iter().take(WEIGHED).map(|(_, members)| group(members)).collect();
     (!points.is_empty()).then(|| Scan {
         name: format!("{PERIODIC} of one frequency at all joints"),
@@ -78,7 +79,7 @@ impl<'s> Point<'s> {
                         .fold([0.0, 0.0], |[r, s], (f, (with, square))| [r + f * with, s + f * f * square])
                 })
             });
-            Some(Point { frequency: frequency(candidate)?, promise: promise(sums), candidate })
+            Some(Point { frequency: frequency(candidate)?, promise: screening_score(sums), candidate })
         };
         scan.points.iter().zip(functions).filter_map(of).collect()
     }
@@ -96,19 +97,19 @@ fn frequency(point: &Candidate) -> Option<f64> {
 }
 
 /// All of them as one, each with amplitudes of its own.
-fn grouped(members: &[&Candidate]) -> Candidate {
+fn combine_members(members: &[&Candidate]) -> Candidate {
     Candidate {
         spec: members.iter().map(|c| c.spec.as_str()).collect::<Vec<_>>().join(Candidate::AND),
         target: "all joints".to_owned(),
         known: None,
-        amplitudes: members.iter().flat_map(|c| named(c)).collect(),
+        amplitudes: members.iter().flat_map(|c| qualified_amplitudes(c)).collect(),
         columns: Columns::Together(members.iter().map(|c| c.columns.clone()).collect()),
         ..members[0].clone()
     }
 }
 
 /// Its amplitudes, told apart from those of the other members.
-fn named(c: &Candidate) -> Vec<Amplitude> {
+fn qualified_amplitudes(c: &Candidate) -> Vec<Amplitude> {
     let full = |a: &Amplitude| Amplitude { name: format!("{}.{}", c.spec, a.name), ..a.clone() };
     c.amplitudes.iter().map(full).collect()
 }

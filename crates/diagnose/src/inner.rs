@@ -7,22 +7,22 @@ use crate::diagnosis::{
     BeforeAfter, CandidateReport, Diagnosis, FoundEffect, JudgedOn, NOT_LISTED, NotTestable, Rival,
     SignificanceTest, UnknownReport, Verdict,
 };
-use crate::events::{passing, together};
-use crate::forward::{Accepted, named};
+use crate::events::{simultaneous_events, temporary_since};
+use crate::forward::{Accepted, accepted_candidates};
 use crate::judge::Grade;
 use crate::nested::RESAMPLINGS;
-use crate::outliers::{Cleaned, flipped, set_aside};
+use crate::outliers::{Cleaned, flipped_arrivals, set_aside};
 use crate::problem::{Candidate, Part, Problem};
 use crate::ranking::Ranking;
 use crate::refit::Refit;
-use crate::reports::{candidate_reports, not_testable, parameters};
+use crate::reports::{candidate_reports, not_testable, parameter_reports};
 use crate::scatter::Scatter;
 use crate::search::{Search, from_nothing, search};
-use crate::settle::{Instead, settle};
+use crate::settle::{Instead, resolve_names};
 use crate::unknown::unknown_report;
 use crate::weigh::Weighed;
 use crate::{DiagnoseError, next};
-use armcal_core::{DwellId, Severity, Stage, Warning, listed};
+use armcal_core::{DwellId, Severity, Stage, Warning, list_names};
 use armcal_model::Toggle;
 use nalgebra::DVector;
 use std::collections::BTreeSet;
@@ -40,7 +40,7 @@ pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Resu
 }
 
 /// The names of a search through a problem of some of the dwells, to begin with in the problem of all.
-pub(crate) fn propose(
+pub(crate) fn propose_candidates(
     refit: &mut dyn Refit,
     config: &DiagnosisConfig,
 ) -> Result<Vec<Candidate>, DiagnoseError> {
@@ -49,7 +49,7 @@ pub(crate) fn propose(
     whole.check()?;
     let Cleaned { keep, problem, weighed, .. } = set_aside(whole.evaluable(&mut BTreeSet::new()), config);
     let mut conditioned_problems = ConditionedProblems::new(refit, keep, (problem, weighed), config);
-    Ok(named(&from_nothing(&mut conditioned_problems, config)?.accepted))
+    Ok(accepted_candidates(&from_nothing(&mut conditioned_problems, config)?.accepted))
 }
 
 /// [`diagnose_problem`] with names that were `proposed`.
@@ -67,7 +67,7 @@ pub(crate) fn diagnose_beyond(
     let mut conditioned_problems = ConditionedProblems::new(refit, keep, (problem, weighed), config);
     conditioned_problems.dropped = dropped;
     let mut search = search(&mut conditioned_problems, proposed, config)?;
-    settle(&mut search, &mut conditioned_problems, config)?;
+    resolve_names(&mut search, &mut conditioned_problems, config)?;
     let conditioned = conditioned_problems.with(&[])?;
     let ranking = Ranking::of(&search, &conditioned, &mut conditioned_problems, config);
     let before = Before::of(&conditioned, ranking, config);
@@ -81,9 +81,10 @@ fn not_evaluated(dropped: &BTreeSet<String>) -> Option<Warning> {
     let names: Vec<String> = dropped.iter().cloned().collect();
     let message = format!(
         "{} had no part in the choice: a derivative is no number here, or the model with it cannot be fitted",
-        listed(&names)
+        list_names(&names)
     );
-    let notice = || Warning::new(Severity::Notice, Stage::Diagnose, "not-evaluated", listed(&names), message);
+    let notice =
+        || Warning::new(Severity::Notice, Stage::Diagnose, "not-evaluated", list_names(&names), message);
     (!names.is_empty()).then(notice)
 }
 
@@ -112,7 +113,7 @@ impl Before {
             p_adjusted: top.map_or(1.0, |t| t.own().p_adjusted),
             tried_unlisted: weighed.unlisted.len(),
             candidates: candidate_reports(conditioned, &ranking.explanations, top, config),
-            cannot_tell_apart: confused(problem, weighed, config),
+            cannot_tell_apart: confusable_pairs(problem, weighed, config),
             not_testable: not_testable(problem, weighed),
             floor_mm: floor_mm(problem),
             error_mm: error_mm(problem, weighed),
@@ -198,7 +199,7 @@ fn found_effect(a: &Accepted, config: &DiagnosisConfig) -> FoundEffect {
         set.push(NOT_LISTED.to_string());
     }
     let probability = a.probability(|what| matches!(what, Instead::Entry(k) if a.set.contains(&k)));
-    let (parameters, combination) = parameters(judged, weighed);
+    let (parameters, combination) = parameter_reports(judged, weighed);
     FoundEffect {
         name: name(&judged.entry),
         set,
@@ -237,7 +238,7 @@ fn rival(a: &Accepted, config: &DiagnosisConfig) -> Option<Rival> {
 }
 
 /// Pairs of testable entries whose signatures, at typical size, are the same.
-fn confused(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<[String; 2]> {
+fn confusable_pairs(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<[String; 2]> {
     let crossed = weighed.crossed(problem);
     let width = |k: usize| weighed.entries[k].candidate.columns.len();
     let mut pairs = Vec::new();
@@ -275,7 +276,7 @@ fn warnings(
             names.len(),
             config.outlier_sigma
         );
-        add("suspect-dwell", listed(&names), message);
+        add("suspect-dwell", list_names(&names), message);
     }
     if noise.sigma_ratio > SIGMA_RATIO {
         add(
@@ -303,7 +304,7 @@ fn warnings(
         add("scatter-correlated", "noise".to_string(), message);
     }
     let names: Vec<&str> = search.accepted.iter().map(|a| a.candidate.spec.as_str()).collect();
-    for of_one in together(&names) {
+    for of_one in simultaneous_events(&names) {
         let message = format!(
             "{} tell of one moment: one event, such as a collision, a restart or a remounted part, may have done all of it",
             of_one.join(" and ")
@@ -315,7 +316,7 @@ fn warnings(
             let message = format!(
                 "{} and not {}: these data do not tell them apart, the pipeline does (\"{reason}\")",
                 a.candidate.spec,
-                listed(&a.instead_of)
+                list_names(&a.instead_of)
             );
             add("named-as-known", a.candidate.spec.clone(), message);
         }
@@ -323,7 +324,7 @@ fn warnings(
             let message = format!(
                 "{}: {} came out negative, which no such mechanism is; something else acts that looks like it",
                 a.candidate.spec,
-                listed(&a.judged.impossible)
+                list_names(&a.judged.impossible)
             );
             add("negative-size", a.candidate.spec.clone(), message);
         }
@@ -365,7 +366,7 @@ fn warnings(
 fn seen_by_the_sensor_alone(a: &Accepted) -> bool {
     let dwells = &a.conditioned.problem.dwells;
     let shifted = SHIFTS.contains(&a.candidate.family.as_str());
-    let during = passing(&a.candidate.spec).filter(|_| shifted);
+    let during = temporary_since(&a.candidate.spec).filter(|_| shifted);
     during.is_some_and(|during| {
         dwells.iter().filter(|d| during.holds(d.id)).flat_map(|d| &d.parts).all(|part| part.tracked)
     })
@@ -386,7 +387,7 @@ fn direction_suspects(a: &Accepted) -> Vec<DwellId> {
     let with = projection.project(&columns) * &fitted.estimate;
     // Residual without the effect, the geometry as fitted with it.
     let residual = projection.projected_residual() - with + &signature;
-    flipped(problem, residual.as_slice(), signature.as_slice())
+    flipped_arrivals(problem, residual.as_slice(), signature.as_slice())
         .into_iter()
         .map(|i| problem.dwells[i].id)
         .collect()

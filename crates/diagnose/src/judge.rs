@@ -5,9 +5,9 @@ use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
 use crate::confusion::{OneStep, Signature, half_width, one_step};
 use crate::contrasts::{Contrast, contrast};
-use crate::crossval::{by_recording, solve};
-use crate::evidence::{best_amplitude, coefficients};
-use crate::places::units;
+use crate::crossval::{by_recording, solve_cholesky};
+use crate::evidence::{best_amplitude, posterior_coefficients};
+use crate::places::independent_units;
 use crate::problem::{Amplitude, Problem};
 use crate::projection::Gram;
 use crate::scatter::Scatter;
@@ -160,7 +160,7 @@ pub(crate) fn judge(
     let fitted = one_step(&gram, 1.0);
     let residual_variance = projection.variance_without(significance[entry].score);
     let candidate = &weighed.entries[entry].candidate;
-    let impossible = impossible(&candidate.amplitudes, &fitted, residual_variance);
+    let impossible = negative_amplitudes(&candidate.amplitudes, &fitted, residual_variance);
 
     let columns = &candidate.columns;
     let effect = columns.dense(&problem.dwells, 1.0);
@@ -206,7 +206,7 @@ impl Unlisted {
         let above = score.above(own);
         let columns = weighed.dense(&best.what.columns, problem);
         let gram = weighed.base.gram(&columns);
-        let (theta, _) = coefficients(&gram, best_amplitude(&gram, &weighed.base, config));
+        let (theta, _) = posterior_coefficients(&gram, best_amplitude(&gram, &weighed.base, config));
         let name = &weighed.entries[entry];
         let of_name = weighed.dense(&name.candidate.columns, problem);
         let cosine = Signature::new(&columns, &gram, &theta).cosine(&of_name, &name.gram);
@@ -222,7 +222,7 @@ fn relative_sigma(fitted: &OneStep, variance: f64) -> f64 {
 }
 
 /// Amplitudes of which the whole 95 % interval is negative though physics does not let them be.
-fn impossible(amplitudes: &[Amplitude], fitted: &OneStep, variance: f64) -> Vec<String> {
+fn negative_amplitudes(amplitudes: &[Amplitude], fitted: &OneStep, variance: f64) -> Vec<String> {
     let below = |k: usize| {
         let high = fitted.estimate[k] + half_width((variance * fitted.covariance[(k, k)]).max(0.0).sqrt());
         amplitudes[k].never_negative && high < 0.0
@@ -246,7 +246,7 @@ fn gate_directions<'p>(problem: &'p Problem, weighed: &'p Weighed) -> Vec<Direct
 /// Dwells that keep their sign together: as errors seem to repeat.
 pub(crate) fn clusters(problem: &Problem, scatter: &Scatter) -> Vec<Vec<usize>> {
     let mut groups: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
-    let unit = if scatter.repeats() { units(problem) } else { Vec::new() };
+    let unit = if scatter.repeats() { independent_units(problem) } else { Vec::new() };
     for (i, d) in problem.dwells.iter().enumerate() {
         let key = match unit.get(i) {
             _ if scatter.remembers() => (d.id.recording, d.id.dwell / BLOCK),
@@ -271,7 +271,7 @@ pub(crate) fn base_fit(problem: &Problem, products: &DMatrix<f64>, scale: f64) -
         normal[(k, k)] += precision;
         right[k] -= precision * problem.geometry_offset[k];
     }
-    solve(&crate::projection::cholesky_upper(normal), &right)
+    solve_cholesky(&crate::projection::cholesky_upper(normal), &right)
 }
 
 #[cfg(test)]

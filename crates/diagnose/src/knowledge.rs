@@ -1,7 +1,7 @@
 //! What the user knows of an arm: effects that cannot act there, the only ones that can, and those that do.
 
 use crate::{DiagnoseError, DiagnosisConfig};
-use armcal_core::{Severity, Stage, Warning, listed};
+use armcal_core::{Severity, Stage, Warning, list_names};
 use armcal_model::EffectSpec;
 use std::collections::BTreeMap;
 
@@ -38,13 +38,14 @@ impl Knowledge {
 
     /// Whether an effect may be an explanation.
     pub(crate) fn tries(&self, spec: &EffectSpec) -> bool {
-        covering(&self.exclude, spec).is_none()
-            && (self.only.is_empty() || covering(&self.only, spec).or_else(|| self.acts(spec)).is_some())
+        covering_reason(&self.exclude, spec).is_none()
+            && (self.only.is_empty()
+                || covering_reason(&self.only, spec).or_else(|| self.acts(spec)).is_some())
     }
 
     /// Why an effect is known to act.
     pub(crate) fn acts(&self, spec: &EffectSpec) -> Option<&str> {
-        covering(&self.known, spec)
+        covering_reason(&self.known, spec)
     }
 
     /// What was not tried and why, and which parameters of effects are held, for the user to remember.
@@ -54,13 +55,13 @@ impl Knowledge {
         };
         let mut said = Vec::new();
         if !self.exclude.is_empty() {
-            said.push(format!("{} not tried", listed(&with_reason(&self.exclude))));
+            said.push(format!("{} not tried", list_names(&with_reason(&self.exclude))));
         }
         if !self.only.is_empty() {
-            said.push(format!("of the catalogue only {} tried", listed(&with_reason(&self.only))));
+            said.push(format!("of the catalogue only {} tried", list_names(&with_reason(&self.only))));
         }
         if !held.is_empty() {
-            said.push(format!("{} held", listed(held)));
+            said.push(format!("{} held", list_names(held)));
         }
         let message = format!("as the pipeline says: {}", said.join("; "));
         let notice = Warning::new(Severity::Notice, Stage::Diagnose, "not-tried", "diagnosis", message);
@@ -68,7 +69,7 @@ impl Knowledge {
     }
 }
 
-fn covering<'r>(all: &'r Reasons, spec: &EffectSpec) -> Option<&'r str> {
+fn covering_reason<'r>(all: &'r Reasons, spec: &EffectSpec) -> Option<&'r str> {
     all.iter().find(|(wide, _)| wide.covers(spec)).map(|(_, reason)| reason.as_str())
 }
 

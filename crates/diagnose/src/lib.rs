@@ -93,7 +93,7 @@ pub use diagnosis::*;
 pub use error::DiagnoseError;
 pub use inner::diagnose_problem;
 pub use knowledge::Knowledge;
-pub use nested::{Nested, nested};
+pub use nested::{Nested, nested_validation};
 pub use observed::{Calibrated, diagnose};
 pub use problem::{Amplitude, Candidate, Channel, Columns, DwellRow, Part, Problem, Scan};
 pub use refit::Refit;

@@ -159,12 +159,12 @@ impl<'a> ModelRefit<'a> {
 
 impl Refit for ModelRefit<'_> {
     fn problem(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
-        let fitted = self.fitted(&names(accepted))?;
+        let fitted = self.fitted(&member_specs(accepted))?;
         self.view(&fitted.model, &fitted.values).problem()
     }
 
     fn base(&mut self, accepted: &[Candidate]) -> Result<Problem, DiagnoseError> {
-        let fitted = self.fitted(&names(accepted))?;
+        let fitted = self.fitted(&member_specs(accepted))?;
         self.view(&fitted.model, &fitted.values).problem_at()
     }
 
@@ -173,9 +173,9 @@ impl Refit for ModelRefit<'_> {
         if candidate.is_group() || self.sizes.contains_key(&candidate.spec) {
             return Ok(false);
         }
-        let base = names(accepted);
+        let base = member_specs(accepted);
         let fitted = self.fitted(&base)?;
-        let with = self.fitted(&names(&[accepted, std::slice::from_ref(candidate)].concat()))?;
+        let with = self.fitted(&member_specs(&[accepted, std::slice::from_ref(candidate)].concat()))?;
         let own = with.model.effects().iter().find(|e| e.spec.to_string() == candidate.spec);
         let size = own.map_or(0.0, |e| with.values[e.parameters.start]);
         let spec = self.model.effect(&candidate.spec)?;
@@ -186,7 +186,7 @@ impl Refit for ModelRefit<'_> {
 }
 
 /// Names of the effects, members of groups each for itself, in order.
-fn names(accepted: &[Candidate]) -> Vec<String> {
+fn member_specs(accepted: &[Candidate]) -> Vec<String> {
     let mut names: Vec<String> = accepted.iter().flat_map(|c| c.members()).map(str::to_owned).collect();
     names.sort();
     names.dedup();

@@ -37,7 +37,7 @@ pub struct Nested {
 ///
 /// # Errors
 /// A turn that cannot be calibrated or diagnosed.
-pub fn nested(
+pub fn nested_validation(
     calibrated: &Calibrated<'_>,
     found: &Diagnosis,
     config: &DiagnosisConfig,
@@ -47,7 +47,7 @@ pub fn nested(
     let turns = holdout_turns(model, observations, holdout)?;
     let config = DiagnosisConfig { resamplings: config.resamplings.min(RESAMPLINGS), ..config.clone() };
     let done: Vec<Result<Fold, DiagnoseError>> =
-        turns.par_iter().map(|held| turn(calibrated, held, &config)).collect();
+        turns.par_iter().map(|held| diagnose_fold(calibrated, held, &config)).collect();
     let done = done.into_iter().collect::<Result<Vec<_>, _>>()?;
     let after: BTreeMap<DwellId, f64> =
         done.iter().flat_map(|t| t.errors_m.iter().map(|(d, e)| (*d, *e))).collect();
@@ -65,7 +65,7 @@ struct Fold {
     errors_m: BTreeMap<DwellId, f64>,
 }
 
-fn turn(
+fn diagnose_fold(
     calibrated: &Calibrated<'_>,
     held: &[usize],
     config: &DiagnosisConfig,
@@ -74,7 +74,7 @@ fn turn(
     let is_held = |i: usize| held.binary_search(&i).is_ok();
     let seen: Vec<Observation> =
         observations.iter().enumerate().filter(|(i, _)| !is_held(*i)).map(|(_, o)| o.clone()).collect();
-    let (holdout, calibration) = inner(calibrated, &seen)?;
+    let (holdout, calibration) = inner_holdout(calibrated, &seen)?;
     let within =
         Calibrated { model, calibration: &calibration, observations: &seen, session, fit, holdout: &holdout };
     let found = diagnose(&within, config)?;
@@ -90,7 +90,7 @@ fn turn(
 }
 
 /// The hold-out once more among what a turn sees, or folds of it where too little is left for that.
-fn inner(
+fn inner_holdout(
     calibrated: &Calibrated<'_>,
     seen: &[Observation],
 ) -> Result<(HoldoutConfig, Calibration), DiagnoseError> {

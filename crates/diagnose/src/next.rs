@@ -21,9 +21,10 @@ const GAPS: usize = 3;
 
 /// Puts what the finding itself asks for before all else: the angles where a curve over a joint was not seen, the dwells in
 /// which unexplained errors are largest.
-pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names: &[String]) {
+pub(crate) fn prepend_findings(d: &mut Diagnosis, observations: &[Observation], joint_names: &[String]) {
     let over_its_angle = |joint: usize, frequency: Option<f64>| {
-        let gaps = gaps(observations.iter().filter_map(|o| o.joint_rad.get(joint).copied()), frequency)?;
+        let gaps =
+            describe_gaps(observations.iter().filter_map(|o| o.joint_rad.get(joint).copied()), frequency)?;
         Some(format!("turn joint {} ({}) {gaps}", joint + 1, joint_names.get(joint)?))
     };
     let curves = d.unlisted.iter().filter(|u| u.unit == Unit::Radian).filter_map(UnknownReport::own_angle);
@@ -57,7 +58,7 @@ pub(crate) fn lead(d: &mut Diagnosis, observations: &[Observation], joint_names:
 
 /// Where a joint was not read finely enough for an error over its own angle: of `frequency` periods a turn, or of a shape
 /// that no formula follows. None where it was.
-fn gaps(angles_rad: impl Iterator<Item = f64>, frequency: Option<f64>) -> Option<String> {
+fn describe_gaps(angles_rad: impl Iterator<Item = f64>, frequency: Option<f64>) -> Option<String> {
     let mut angles: Vec<f64> = angles_rad.collect();
     angles.sort_by(f64::total_cmp);
     angles.dedup_by(|b, a| *b - *a < ONE_ANGLE_RAD);
@@ -125,14 +126,14 @@ pub(crate) fn record_next(problem: &Problem, diagnosis: &Diagnosis) -> Vec<Strin
 
 #[cfg(test)]
 mod tests {
-    use super::gaps;
+    use super::describe_gaps;
 
     #[test]
     fn gaps_are_told_by_the_period_or_by_the_usual_step() {
         // Every 5 deg from 0 to 100, none between 40 and 70; each angle twice.
         let degrees = (0..=20).map(|i| 5.0 * f64::from(i)).filter(|a| !(42.0..68.0).contains(a));
         let angles: Vec<f64> = degrees.flat_map(|a| [a, a + 1e-5]).map(f64::to_radians).collect();
-        let told = |frequency| gaps(angles.iter().copied(), frequency);
+        let told = |frequency| describe_gaps(angles.iter().copied(), frequency);
         assert!(
             told(None)
                 .is_some_and(|g| g.starts_with("in steps of at most 15.0 deg through 40.0 to 70.0 deg:"))
@@ -141,6 +142,6 @@ mod tests {
         assert!(told(Some(10.0)).is_some_and(|g| g.contains("at most 9.0 deg through 40.0 to 70.0 deg:")));
         assert!(told(Some(30.0)).is_some_and(|g| g.contains("and 12 more")));
         assert_eq!(told(Some(2.0)), None, "a quarter of a period is 45 deg");
-        assert_eq!(gaps([0.3; 9].into_iter(), None), None, "it never turned");
+        assert_eq!(describe_gaps([0.3; 9].into_iter(), None), None, "it never turned");
     }
 }

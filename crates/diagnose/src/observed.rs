@@ -2,10 +2,10 @@
 
 use crate::conclude::Evidence;
 use crate::diagnosis::Refitted;
-use crate::inner::{diagnose_beyond, propose};
+use crate::inner::{diagnose_beyond, propose_candidates};
 use crate::knowledge::Knowledge;
 use crate::model_refit::{ModelRefit, Seen};
-use crate::places::{places_of_poses, thinned};
+use crate::places::{places_of_poses, thin_observations};
 use crate::{DiagnoseError, Diagnosis, DiagnosisConfig};
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate_beside};
 use armcal_core::Observation;
@@ -54,8 +54,8 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
     let model = &as_fitted(calibrated)?;
     let joint_names = model.chain().joint_names();
     let values = calibration.fit.values();
-    let weighed: Vec<Observation> = thinned(observations, config).into_iter().cloned().collect();
-    let few = few(observations, config);
+    let weighed: Vec<Observation> = thin_observations(observations, config).into_iter().cloned().collect();
+    let few = initial_subset(observations, config);
     let places = places_of_poses(&weighed);
     let seen = Seen { observations, weighed: &weighed, few: &few, places: &places };
     let knowledge = || Knowledge::of(config, joint_names);
@@ -67,24 +67,25 @@ pub fn diagnose(calibrated: &Calibrated<'_>, config: &DiagnosisConfig) -> Result
         let seen = Seen { observations: &few, weighed: &few, few: &[], places: &places };
         let mut scout = ModelRefit::new((model, values), seen, session, fit, knowledge()?);
         // Where few cannot be fitted, or weighed, all of them may be.
-        proposed = propose(&mut scout, config).unwrap_or_default();
+        proposed = propose_candidates(&mut scout, config).unwrap_or_default();
         refit.take_sizes(scout);
     }
     let mut diagnosis = diagnose_beyond(&mut refit, &proposed, config)?;
     diagnosis.warnings.extend(refit.knowledge.warning(&model.declared_held()));
-    let refitted = refitted(calibrated, &diagnosis).map(|found| diagnosis.with_rests(calibrated, found));
+    let refitted =
+        refit_suggested(calibrated, &diagnosis).map(|found| diagnosis.with_rests(calibrated, found));
     diagnosis.conclude(Evidence { before: calibration, observations, refitted, joint_names }, config);
     Ok(diagnosis)
 }
 
 /// Of very many observations a few that tell nearly where a fit to all of them ends; none where recordings, which may have
 /// parameters of their own, would have few of these each.
-fn few<'o>(observations: &'o [Observation], config: &DiagnosisConfig) -> Vec<&'o Observation> {
+fn initial_subset<'o>(observations: &'o [Observation], config: &DiagnosisConfig) -> Vec<&'o Observation> {
     let recordings: BTreeSet<usize> = observations.iter().map(|o| o.dwell.recording).collect();
     if observations.len() < MANY || recordings.len() * OF_EACH > FEW {
         return Vec::new();
     }
-    thinned(observations, &DiagnosisConfig { max_weighed: FEW, ..config.clone() })
+    thin_observations(observations, &DiagnosisConfig { max_weighed: FEW, ..config.clone() })
 }
 
 /// The model with the priors that its fit learnt and the bounds that it took, which hold for all that is tried beside it.
@@ -103,13 +104,13 @@ fn as_fitted(calibrated: &Calibrated<'_>) -> Result<Model, DiagnoseError> {
 impl Diagnosis {
     /// Fits what was found again, where it was read back from the results of a run.
     pub fn refit(&mut self, calibrated: &Calibrated<'_>) {
-        self.refitted = refitted(calibrated, self).map(Box::new);
+        self.refitted = refit_suggested(calibrated, self).map(Box::new);
     }
 }
 
 /// The model with everything that was found, on the same observations and hold-out. None where nothing was found, or
 /// where this hold-out leaves no way to fit it.
-fn refitted(calibrated: &Calibrated<'_>, diagnosis: &Diagnosis) -> Option<Refitted> {
+fn refit_suggested(calibrated: &Calibrated<'_>, diagnosis: &Diagnosis) -> Option<Refitted> {
     let effects = diagnosis.suggested(calibrated.model.chain().joint_names()).ok()?;
     if effects.is_empty() { None } else { calibrated.with(effects) }
 }

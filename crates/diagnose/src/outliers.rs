@@ -47,7 +47,7 @@ pub(crate) fn set_aside(whole: Problem, config: &DiagnosisConfig) -> Cleaned {
     for _ in 0..ROUNDS {
         let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
         let found = suspects(cut.as_ref().unwrap_or(&whole), &weighed, config);
-        let found = accidents(&whole, &keep, found.into_iter().map(|i| kept[i]).collect());
+        let found = plausible_outliers(&whole, &keep, found.into_iter().map(|i| kept[i]).collect());
         if found.is_empty() {
             break;
         }
@@ -64,7 +64,7 @@ pub(crate) fn set_aside(whole: Problem, config: &DiagnosisConfig) -> Cleaned {
 /// it is in; and what errs alike under one of them is structure.
 fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> Vec<usize> {
     let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| b.0);
-    let (left, square) = predicted(problem, weighed, best, config);
+    let (left, square) = leave_one_out(problem, weighed, best, config);
     let reduced: Vec<f64> =
         problem.dwells.iter().zip(&square).map(|(d, square)| square / median_square(d.rows as f64)).collect();
     let variance = median(&reduced).max(1e-300);
@@ -79,17 +79,17 @@ fn suspects(problem: &Problem, weighed: &Weighed, config: &DiagnosisConfig) -> V
         if found.is_empty() {
             break;
         }
-        let (left, square) = predicted(problem, weighed, Some(&entry.candidate.columns), config);
+        let (left, square) = leave_one_out(problem, weighed, Some(&entry.candidate.columns), config);
         found.retain(|i| rare(*i, square[*i]));
         lefts.push(left);
     }
-    let alike = lefts.iter().any(|left| agreement(problem, left, &found) >= MAX_AGREEMENT);
+    let alike = lefts.iter().any(|left| mean_neighbour_cosine(problem, left, &found) >= MAX_AGREEMENT);
     if alike { Vec::new() } else { found }
 }
 
 /// Residual of each dwell as one explanation, or none, predicts it without the dwell, and its square in units of what that
 /// scatters.
-fn predicted(
+fn leave_one_out(
     problem: &Problem,
     weighed: &Weighed,
     explanation: Option<&Columns>,
@@ -98,7 +98,7 @@ fn predicted(
     let effect = explanation.map(|columns| weighed.regularised(columns, problem, config));
     let alone: Vec<Group> = (0..problem.dwells.len()).map(|i| vec![i].into()).collect();
     let [fitted, left] = fitted_and_left_out(problem, effect.as_ref(), &alone, weighed.scale);
-    let square = studentised(problem, &left, &fitted);
+    let square = studentised_squares(problem, &left, &fitted);
     (left, square)
 }
 
@@ -109,14 +109,14 @@ fn median_square(rows: f64) -> f64 {
 
 /// `r' (I - H)^-1 r` of each dwell: the square of its left-out residual in units of what that scatters. A dwell that
 /// alone determines something is predicted badly without it, and that is no sign against it (Cook, Weisberg 1982, 2.2).
-fn studentised(problem: &Problem, left: &DVector<f64>, fitted: &DVector<f64>) -> Vec<f64> {
+fn studentised_squares(problem: &Problem, left: &DVector<f64>, fitted: &DVector<f64>) -> Vec<f64> {
     let rows = |of: &DVector<f64>, d: &DwellRow| of.rows(d.first_row, d.rows).into_owned();
     problem.dwells.iter().map(|d| rows(left, d).dot(&rows(fitted, d)).max(0.0)).collect()
 }
 
 /// Of the suspects, those that can be accidents: few, with all that were set aside before; not in a row; and not what
 /// alone shows a joint, a direction, a load or a temperature.
-fn accidents(whole: &Problem, keep: &[bool], found: Vec<usize>) -> Vec<usize> {
+fn plausible_outliers(whole: &Problem, keep: &[bool], found: Vec<usize>) -> Vec<usize> {
     let mut all: BTreeSet<usize> =
         (0..keep.len()).filter(|i| !keep[*i]).chain(found.iter().copied()).collect();
     let few = all.len() as f64 <= MAX_SHARE * whole.dwells.len() as f64;
@@ -125,7 +125,7 @@ fn accidents(whole: &Problem, keep: &[bool], found: Vec<usize>) -> Vec<usize> {
     }
     let rows = in_a_row(whole, &all);
     all.retain(|i| !rows.contains(i));
-    let needed = needed(whole, &all);
+    let needed = needed_for_variance(whole, &all);
     found.into_iter().filter(|i| all.contains(i) && !needed.contains(i)).collect()
 }
 
@@ -142,7 +142,7 @@ fn in_a_row(whole: &Problem, suspects: &BTreeSet<usize>) -> BTreeSet<usize> {
 }
 
 /// Those of the suspects without which something that sets dwells apart would hardly vary.
-fn needed(whole: &Problem, suspects: &BTreeSet<usize>) -> BTreeSet<usize> {
+fn needed_for_variance(whole: &Problem, suspects: &BTreeSet<usize>) -> BTreeSet<usize> {
     let mut needed = BTreeSet::new();
     for value in what_varies(whole) {
         let kept: Vec<f64> = (0..value.len()).filter(|i| !suspects.contains(i)).map(|i| value[i]).collect();
@@ -175,7 +175,7 @@ fn mean_and_variance(values: &[f64]) -> (f64, f64) {
 /// Mean cosine between the residual of each suspect and that of the suspect next to it in joint space. Accidents point
 /// anywhere; neighbours that err alike are a cause, but those within one accident: two dwells in which the same markers were
 /// swapped.
-fn agreement(problem: &Problem, left: &DVector<f64>, found: &[usize]) -> f64 {
+fn mean_neighbour_cosine(problem: &Problem, left: &DVector<f64>, found: &[usize]) -> f64 {
     if found.len() < MIN_AGREEING {
         return 0.0;
     }
@@ -198,7 +198,7 @@ fn agreement(problem: &Problem, left: &DVector<f64>, found: &[usize]) -> f64 {
 }
 
 /// Dwells whose arrival direction looks wrong: turning it over would remove more than 25 sigma squared.
-pub(crate) fn flipped(problem: &Problem, residual: &[f64], signature: &[f64]) -> Vec<usize> {
+pub(crate) fn flipped_arrivals(problem: &Problem, residual: &[f64], signature: &[f64]) -> Vec<usize> {
     let change = |i: usize| -> f64 {
         // e - G theta with s turned over is e + G theta: a change of 4 e'G theta in the square.
         let d = &problem.dwells[i];

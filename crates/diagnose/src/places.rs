@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 const ALIKE_RAD: f64 = 0.052;
 
 /// Independent unit of each dwell: its place, or its neighbourhood in joint space where places are few or unknown.
-pub(crate) fn units(problem: &Problem) -> Vec<usize> {
+pub(crate) fn independent_units(problem: &Problem) -> Vec<usize> {
     let mut known: BTreeMap<&str, usize> = BTreeMap::new();
     for place in problem.dwells.iter().filter_map(|d| d.place.as_deref()) {
         let next = known.len();
@@ -32,7 +32,10 @@ pub(crate) fn units(problem: &Problem) -> Vec<usize> {
 
 /// The observations of at most `max_weighed` poses: one drawn from each of as many equal stretches of time, so that every
 /// part of the session and, as motions go, of joint space keeps its share. The draw keeps clear of a regular motion's period.
-pub(crate) fn thinned<'o>(observations: &'o [Observation], config: &DiagnosisConfig) -> Vec<&'o Observation> {
+pub(crate) fn thin_observations<'o>(
+    observations: &'o [Observation],
+    config: &DiagnosisConfig,
+) -> Vec<&'o Observation> {
     let poses = measured_together(observations);
     let (n, most) = (poses.len(), config.max_weighed);
     if n <= most {
@@ -47,14 +50,14 @@ pub(crate) fn thinned<'o>(observations: &'o [Observation], config: &DiagnosisCon
     drawn.into_iter().flat_map(|i| &observations[poses[i].clone()]).collect()
 }
 
-/// [`places`] of each pose of these observations.
+/// [`place_names`] of each pose of these observations.
 pub(crate) fn places_of_poses(observations: &[Observation]) -> Vec<Option<String>> {
     let poses = measured_together(observations);
-    places(&poses.iter().map(|pose| &observations[pose.start]).collect::<Vec<_>>())
+    place_names(&poses.iter().map(|pose| &observations[pose.start]).collect::<Vec<_>>())
 }
 
 /// The cavity; for a tracked pose the pose itself, where it was visited more than once. One observation of each pose is asked.
-pub(crate) fn places(observations: &[&Observation]) -> Vec<Option<String>> {
+pub(crate) fn place_names(observations: &[&Observation]) -> Vec<Option<String>> {
     let mut poses = AlikePoses::within(SAME_POSE_RAD);
     let pose = |o: &&Observation| o.cavity().is_none().then(|| poses.group_of(&o.joint_rad));
     let member: Vec<Option<usize>> = observations.iter().map(pose).collect();

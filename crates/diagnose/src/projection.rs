@@ -10,7 +10,7 @@
 //! Q comes from a Cholesky factor of the normal equations, applied twice (CholeskyQR2; Yamamoto et al., ETNA 44,
 //! 2015), which is as orthogonal as Householder's and a matrix product fast.
 
-use armcal_calibrate::{gram, inner};
+use armcal_calibrate::{gram, inner_product};
 use nalgebra::{DMatrix, DVector};
 
 /// Geometry projected out of one set of whitened rows.
@@ -98,12 +98,12 @@ impl Projection {
 
     /// Data rows of projected columns.
     pub fn project(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        columns - &self.q * inner(&self.q, columns)
+        columns - &self.q * inner_product(&self.q, columns)
     }
 
     /// Products of columns in the projected space.
     pub fn gram(&self, columns: &DMatrix<f64>) -> Gram {
-        let c = inner(&self.q, columns);
+        let c = inner_product(&self.q, columns);
         let full = gram(columns);
         Gram {
             raw: full.diagonal(),
@@ -130,7 +130,7 @@ pub(crate) fn cholesky_upper(normal: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Eigenvalues (not negative) and eigenvectors of a Gram matrix; those of rounding are set to zero.
-pub(crate) fn eigen(a: &DMatrix<f64>, raw_norm: f64) -> (DVector<f64>, DMatrix<f64>) {
+pub(crate) fn gram_eigen(a: &DMatrix<f64>, raw_norm: f64) -> (DVector<f64>, DMatrix<f64>) {
     let eigen = a.clone().symmetric_eigen();
     let floor = 1e-9 * raw_norm.max(f64::MIN_POSITIVE);
     (eigen.eigenvalues.map(|v| if v > floor { v } else { 0.0 }), eigen.eigenvectors)

@@ -3,9 +3,9 @@
 use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::Standing;
-use crate::forward::{Accepted, leading};
+use crate::forward::{Accepted, leading_entries};
 use crate::problem::Candidate;
-use crate::score::{Score, weights};
+use crate::score::{Score, bootstrap_weights};
 use crate::search::Search;
 use crate::settle::Instead;
 
@@ -50,13 +50,13 @@ impl Ranking {
 
     /// Where no name was found: what came nearest, by itself.
     fn of_nothing(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Ranking {
-        let listed = leading(conditioned, config);
+        let listed = leading_entries(conditioned, config);
         let unlisted = conditioned.best_unlisted(config).map(|(_, score)| score);
         let costs = conditioned.costs(config);
         let mut scores = vec![(conditioned.nothing(), costs.of_nothing())];
         scores.extend(unlisted.iter().map(|score| (score, costs.of_unlisted())));
         scores.extend(listed.iter().map(|(k, score)| (score, costs.of_entry(*k))));
-        let weights = weights(&scores, config);
+        let weights = bootstrap_weights(&scores, config);
         let others = 1 + usize::from(unlisted.is_some());
         let mut rows: Vec<(&(usize, Score), &f64)> = listed.iter().zip(&weights[others..]).collect();
         rows.sort_by(|a, b| b.1.total_cmp(a.1));
@@ -116,7 +116,7 @@ impl Ranking {
                 explanations.extend(score.map(|s| row(&swapped, p, &s, probability, a.set.contains(&k))));
             }
         }
-        for (k, score) in leading(conditioned, config) {
+        for (k, score) in leading_entries(conditioned, config) {
             let alone = std::slice::from_ref(&conditioned.weighed.entries[k].candidate);
             let known = explanations.iter().any(|e| e.spec() == alone[0].spec);
             let p = conditioned.judge(k, config).own().p_adjusted;

@@ -5,7 +5,7 @@ use crate::combination::{Combination, combination};
 use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
 use crate::confusion::{half_width, one_step, smallest_seen};
-use crate::crossval::{by_place, compare, left_out};
+use crate::crossval::{by_place, compare_left_out, left_out};
 use crate::diagnosis::{BeforeAfter, CandidateReport, NotTestable, ParameterReport};
 use crate::judge::Judged;
 use crate::problem::{Amplitude, Candidate, Columns, Problem};
@@ -20,17 +20,20 @@ const SHOWN: usize = 5;
 const ABSORBED: f64 = 0.9;
 
 /// Sizes of a judged entry from the metric that explains it under white noise, and what is determined of them together.
-pub(crate) fn parameters(judged: &Judged, weighed: &Weighed) -> (Vec<ParameterReport>, Option<Combination>) {
+pub(crate) fn parameter_reports(
+    judged: &Judged,
+    weighed: &Weighed,
+) -> (Vec<ParameterReport>, Option<Combination>) {
     let entry = &weighed.entries[judged.entry];
     let projection = &weighed.base;
     let variance = projection.variance_without(judged.own().score);
     let fitted = one_step(&judged.gram, 1.0);
     let (amplitudes, covariance) = (&entry.candidate.amplitudes, fitted.covariance * variance);
-    let sizes = sizes(amplitudes, &fitted.estimate, &covariance);
+    let sizes = amplitude_reports(amplitudes, &fitted.estimate, &covariance);
     (sizes, combination(amplitudes, &fitted.estimate, &covariance))
 }
 
-fn sizes(
+fn amplitude_reports(
     amplitudes: &[Amplitude],
     estimate: &DVector<f64>,
     covariance: &DMatrix<f64>,
@@ -80,9 +83,9 @@ pub(crate) fn candidate_reports(
             let columns = |k: &usize| weighed.entries[*k].candidate.columns.clone();
             let together = Columns::Together(whole.iter().map(columns).collect()).dense(&problem.dwells, 1.0);
             let after = left_out(problem, Some(&together), &groups, weighed.scale);
-            let held = compare(problem, &before, &after, &groups, config);
+            let held = compare_left_out(problem, &before, &after, &groups, config);
             report.holdout_mm = Some(BeforeAfter { before: held.before, after: held.after });
-            report.same_to_the_data.extend(alike(conditioned, of, config));
+            report.same_to_the_data.extend(same_signature_specs(conditioned, of, config));
         }
         if alone.is_none() {
             report.become_several(explanation, whole.iter().map(|k| of_entry(conditioned, *k, top)));
@@ -110,7 +113,7 @@ fn of_entry(conditioned: &ConditionedProblem, k: usize, top: Option<&Judged>) ->
         spec: c.spec.clone(),
         effect: c.family.clone(),
         target: c.target.clone(),
-        parameters: sizes(&c.amplitudes, &fitted.estimate, &covariance),
+        parameters: amplitude_reports(&c.amplitudes, &fitted.estimate, &covariance),
         standing: None,
         p_adjusted: significance.p_adjusted,
         holdout_mm: None,
@@ -121,7 +124,7 @@ fn of_entry(conditioned: &ConditionedProblem, k: usize, top: Option<&Judged>) ->
 }
 
 /// Other entries whose signatures are that of an entry as it was fitted.
-fn alike(conditioned: &ConditionedProblem, k: usize, config: &DiagnosisConfig) -> Vec<String> {
+fn same_signature_specs(conditioned: &ConditionedProblem, k: usize, config: &DiagnosisConfig) -> Vec<String> {
     let ConditionedProblem { problem, weighed, .. } = conditioned;
     let entry = &weighed.entries[k];
     let projection = &weighed.base;
@@ -180,13 +183,13 @@ pub(crate) fn not_testable(problem: &Problem, weighed: &Weighed) -> Vec<NotTesta
             effect: c.spec.clone(),
             smallest_seen: size(smallest),
             typical: size(1.0),
-            why: why(problem, c, gram.raw.sum(), absorbed),
+            why: why_not_testable(problem, c, gram.raw.sum(), absorbed),
         });
     }
     all
 }
 
-fn why(problem: &Problem, c: &Candidate, raw: f64, absorbed: f64) -> String {
+fn why_not_testable(problem: &Problem, c: &Candidate, raw: f64, absorbed: f64) -> String {
     if raw <= 0.0 {
         return match c.toggle {
             Toggle::Direction => "the arrival directions are unknown or the joint never moves".to_string(),
@@ -200,7 +203,7 @@ fn why(problem: &Problem, c: &Candidate, raw: f64, absorbed: f64) -> String {
     let one_sided = c.toggle == Toggle::Direction
         && (0..problem.joints()).any(|j| {
             let signs: Vec<f64> = problem.dwells.iter().map(|d| d.arrival[j]).collect();
-            !crate::drivers::varies(&signs)
+            !crate::drivers::is_varying(&signs)
         });
     match () {
         () if one_sided => "a joint always arrives from the same side".to_string(),

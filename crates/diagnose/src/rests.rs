@@ -32,7 +32,7 @@ impl Diagnosis {
     /// follow it.
     pub(crate) fn with_rests(&mut self, calibrated: &Calibrated<'_>, found: Refitted) -> Refitted {
         let Some((spec, joint)) = self.loose(calibrated, &found) else { return found };
-        let Some((part, refitted)) = settled(calibrated, &found, &spec, joint) else { return found };
+        let Some((part, refitted)) = fit_rest_part(calibrated, &found, &spec, joint) else { return found };
         let (old, new) = (spec.to_string(), spec.with(REST, part).to_string());
         let names = self.effects.iter_mut().flat_map(|e| std::iter::once(&mut e.name).chain(&mut e.set));
         names.chain(&mut self.names).filter(|name| **name == old).for_each(|name| name.clone_from(&new));
@@ -84,14 +84,14 @@ fn most_of(calibrated: &Calibrated<'_>, found: &Refitted, values: &[f64]) -> Opt
         for (sum, of) in sums.iter_mut().zip(implied_joint_errors(model, values, o, &r.fitted_m)) {
             let Some(ImpliedError { error, sigma }) = of else { continue };
             let along = (error / sigma).powi(2);
-            *sum = with(*sum, along, all);
+            *sum = add_dwell_errors(*sum, along, all);
         }
     }
     least_probable(&sums)
 }
 
 /// The sums with one dwell more: its squared error along a joint of all of it, and half of the rest.
-fn with([along, across, n]: [f64; 3], own: f64, all: f64) -> [f64; 3] {
+fn add_dwell_errors([along, across, n]: [f64; 3], own: f64, all: f64) -> [f64; 3] {
     [along + own, across + 0.5 * (all - own), n + 1.0]
 }
 
@@ -105,7 +105,7 @@ fn least_probable(along_across_n: &[[f64; 3]]) -> Option<(usize, f64)> {
 
 /// The part of the gap in which its joint rests, and the fit that weighs its dwells by that; none where that is
 /// nothing, or more than the gap.
-fn settled(
+fn fit_rest_part(
     calibrated: &Calibrated<'_>,
     found: &Refitted,
     spec: &EffectSpec,

@@ -2,7 +2,7 @@
 
 use crate::DiagnoseError;
 use crate::problem::{Candidate, Channel, Columns, Scan};
-use crate::stretches::{running, stretches, within};
+use crate::stretches::{running_sums, score_between, stretches};
 use crate::view::View;
 use armcal_calibrate::Linearisation;
 use armcal_core::DwellId;
@@ -86,7 +86,7 @@ impl View<'_> {
         let is_known = |spec: &&EffectSpec| products.contains_key(&spec.to_string()) && !refined(spec);
         let new: Vec<EffectSpec> = specs.iter().filter(|spec| !is_known(spec)).cloned().collect();
         let at_once = (LINEARISED / base.residual.len().max(1)).max(1);
-        let (rows, mut others) = (rows(base), BTreeMap::new());
+        let (rows, mut others) = (dwell_rows(base), BTreeMap::new());
         for some in new.chunks(at_once) {
             for (spec, mut candidate) in some.iter().zip(self.candidates(some, base)?) {
                 let product = channel(spec).and_then(|base| candidate.columns.factored(base, &rows));
@@ -115,7 +115,7 @@ impl View<'_> {
         base: &Linearisation,
     ) -> Option<Scan> {
         let Columns::Dense(columns) = &whole.columns else { return None };
-        let found = stretches(&times.dwells, &rows(base), columns, &base.residual);
+        let found = stretches(&times.dwells, &dwell_rows(base), columns, &base.residual);
         let stretch = |(first, last): (DwellId, usize)| family.clone().since(Since::Dwells { first, last });
         let members: Vec<EffectSpec> =
             found.best.into_iter().map(stretch).filter(|spec| self.tried(spec)).collect();
@@ -171,7 +171,7 @@ impl View<'_> {
 }
 
 /// Rows of each dwell.
-fn rows(base: &Linearisation) -> Vec<Range<usize>> {
+fn dwell_rows(base: &Linearisation) -> Vec<Range<usize>> {
     base.poses.iter().map(|pose| pose.rows.clone()).collect()
 }
 
@@ -242,10 +242,10 @@ impl Times {
         }
         let mut in_time: Vec<usize> = (0..self.dwells.len()).collect();
         in_time.sort_unstable_by_key(|i| self.places[*i]);
-        let sums = running(&in_time, &rows(base), columns, &base.residual);
+        let sums = running_sums(&in_time, &dwell_rows(base), columns, &base.residual);
         let promise = |step: &EffectSpec| {
             let on = self.on(step.since.as_ref());
-            within(&sums[on.start], &sums[on.end])
+            score_between(&sums[on.start], &sums[on.end])
         };
         let mut order: Vec<(f64, usize)> = steps.iter().map(promise).zip(0..).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

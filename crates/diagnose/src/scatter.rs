@@ -80,9 +80,9 @@ impl Scatter {
             sigma_ratio: (base.rss / base.dof()).sqrt() * weighed.scale,
             tracked_ratio: ratio(true),
             seated_ratio: ratio(false),
-            tracked_neighbours: neighbours(problem, &unit, true),
-            seated_neighbours: neighbours(problem, &unit, false),
-            places: visits(problem, &unit),
+            tracked_neighbours: neighbour_correlation(problem, &unit, true),
+            seated_neighbours: neighbour_correlation(problem, &unit, false),
+            places: visit_correlation(problem, &unit),
         }
     }
 
@@ -122,7 +122,7 @@ impl Scatter {
 }
 
 /// Of dwells that follow one another in a recording, at other places, all of which was tracked, or seated.
-fn neighbours(problem: &Problem, residual: &DVector<f64>, tracked: bool) -> Option<Correlation> {
+fn neighbour_correlation(problem: &Problem, residual: &DVector<f64>, tracked: bool) -> Option<Correlation> {
     let mut order: Vec<&DwellRow> = problem.dwells.iter().collect();
     order.retain(|d| d.parts.iter().all(|part| part.tracked == tracked));
     order.sort_by_key(|d| d.id);
@@ -137,7 +137,7 @@ fn neighbours(problem: &Problem, residual: &DVector<f64>, tracked: bool) -> Opti
 
 /// Of every two visits to a place, what was measured in either turned into the axes of the board. Of the visits v of a place the
 /// products of every two are `(|sum v|^2 - sum |v|^2) / 2` together.
-fn visits(problem: &Problem, residual: &DVector<f64>) -> Option<Correlation> {
+fn visit_correlation(problem: &Problem, residual: &DVector<f64>) -> Option<Correlation> {
     let mut places: BTreeMap<&str, (DVector<f64>, f64, usize)> = BTreeMap::new();
     for d in &problem.dwells {
         if let Some(place) = &d.place {

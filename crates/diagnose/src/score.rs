@@ -135,7 +135,7 @@ pub fn is_clear(nats: f64, se: f64, detail: f64) -> bool {
 
 /// Weights of explanations that look like probabilities: their shares in copies of the data whose groups are drawn anew. Each
 /// comes with what it costs [nats]: of what predicts alike, the simpler is the more probable.
-pub(crate) fn weights(scores: &[(&Score, f64)], config: &DiagnosisConfig) -> Vec<f64> {
+pub(crate) fn bootstrap_weights(scores: &[(&Score, f64)], config: &DiagnosisConfig) -> Vec<f64> {
     let groups = scores.first().map_or(0, |(score, _)| score.by_group.len());
     let mut rng = ChaCha8Rng::seed_from_u64(config.seed ^ 0x00b3_a0b0);
     let mut weights = vec![0.0; scores.len()];

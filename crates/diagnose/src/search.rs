@@ -4,8 +4,8 @@ use crate::DiagnoseError;
 use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems, as_candidate};
 use crate::config::DiagnosisConfig;
 use crate::curves::{Curve, error_curves};
-use crate::fewer::fewer;
-use crate::forward::{Accepted, Step, confirm, forward, known, named};
+use crate::fewer::merge_names;
+use crate::forward::{Accepted, Step, accepted_candidates, confirm, confirmed_steps, forward_selection};
 use crate::problem::Candidate;
 use std::rc::Rc;
 
@@ -43,26 +43,28 @@ pub(crate) fn search(
     proposed: &[Candidate],
     config: &DiagnosisConfig,
 ) -> Result<Search, DiagnoseError> {
-    let Found { mut accepted, may_be_shape } = match beyond(conditioned_problems, proposed, config)? {
-        Some(found) => fewer(conditioned_problems, found, config)?,
-        None => from_nothing(conditioned_problems, config)?,
-    };
-    let mut names = named(&accepted);
+    let Found { mut accepted, may_be_shape } =
+        match from_proposed_names(conditioned_problems, proposed, config)? {
+            Some(found) => merge_names(conditioned_problems, found, config)?,
+            None => from_nothing(conditioned_problems, config)?,
+        };
+    let mut names = accepted_candidates(&accepted);
     let mut rest = conditioned_problems.with(&names)?;
-    let left_over = something(&rest, config);
+    let left_over = is_something_missing(&rest, config);
     let (mut tentative, mut curves) = (Vec::new(), Vec::new());
     if left_over && !may_be_shape {
         curves = error_curves(conditioned_problems, &names, config)?;
         let mut shapes: Vec<Candidate> = curves.iter().map(|c| c.candidate.clone()).collect();
         accepted = beside_curves(conditioned_problems, accepted, &shapes, &rest, config)?;
-        names = named(&accepted);
+        names = accepted_candidates(&accepted);
         rest = conditioned_problems.with(&names)?;
         if shapes.is_empty() {
             let best = rest.weighed.best_cell().filter(|c| c.ln_evidence >= config.margin_nats);
             shapes.extend(best.map(|cell| as_candidate(&cell.what, &rest, config)));
         }
         if !shapes.is_empty() {
-            let (steps, _) = forward(conditioned_problems, known(&names, &rest), &shapes, config)?;
+            let (steps, _) =
+                forward_selection(conditioned_problems, confirmed_steps(&names, &rest), &shapes, config)?;
             if steps.len() > names.len() {
                 tentative = confirm(conditioned_problems, steps, &shapes, config)?;
                 tentative.retain(|t| names.iter().all(|n| n.spec != t.candidate.spec));
@@ -81,14 +83,14 @@ pub(crate) fn from_nothing(
     conditioned_problems: &mut ConditionedProblems<'_>,
     config: &DiagnosisConfig,
 ) -> Result<Found, DiagnoseError> {
-    let (steps, may_be_shape) = forward(conditioned_problems, Vec::new(), &[], config)?;
+    let (steps, may_be_shape) = forward_selection(conditioned_problems, Vec::new(), &[], config)?;
     let accepted = confirm(conditioned_problems, steps, &[], config)?;
-    fewer(conditioned_problems, Found { accepted, may_be_shape }, config)
+    merge_names(conditioned_problems, Found { accepted, may_be_shape }, config)
 }
 
 /// The same from names that fewer dwells proposed. None where not all of them are confirmed here, each as the best there is
 /// beside the others: then the steps that led to them would be others.
-fn beyond(
+fn from_proposed_names(
     conditioned_problems: &mut ConditionedProblems<'_>,
     proposed: &[Candidate],
     config: &DiagnosisConfig,
@@ -112,7 +114,7 @@ pub(crate) fn going_on(
         return Ok(None);
     }
     let known = accepted.iter().map(|a| Step::known(a.candidate.clone(), a.fall())).collect();
-    let (steps, may_be_shape) = forward(conditioned_problems, known, &[], config)?;
+    let (steps, may_be_shape) = forward_selection(conditioned_problems, known, &[], config)?;
     let same = steps.iter().map(|s| &s.candidate.spec).eq(accepted.iter().map(|a| &a.candidate.spec));
     let accepted = if same { accepted } else { confirm(conditioned_problems, steps, &[], config)? };
     Ok((accepted.len() >= names.len()).then_some(Found { accepted, may_be_shape }))
@@ -129,18 +131,23 @@ fn beside_curves(
     if curves.is_empty() {
         return Ok(accepted);
     }
-    let kept = confirm(conditioned_problems, known(&named(&accepted), rest), curves, config)?;
+    let kept = confirm(
+        conditioned_problems,
+        confirmed_steps(&accepted_candidates(&accepted), rest),
+        curves,
+        config,
+    )?;
     if kept.len() == accepted.len() {
         return Ok(accepted);
     }
-    let mut steps = named(&accepted);
+    let mut steps = accepted_candidates(&accepted);
     steps.retain(|c| kept.iter().any(|k| k.candidate.spec == c.spec));
-    confirm(conditioned_problems, known(&steps, rest), &[], config)
+    confirm(conditioned_problems, confirmed_steps(&steps, rest), &[], config)
 }
 
 /// Whether something without a name is missing: improbable as nothing, and a shape that is not listed says more of dwells that the
 /// fit did not see.
-pub(crate) fn something(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> bool {
+pub(crate) fn is_something_missing(conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> bool {
     conditioned.weighed.p_nothing < config.max_probability_nothing
         && conditioned.best_unlisted(config).is_some_and(|(best, _)| conditioned.predicts(best, config))
 }

@@ -8,11 +8,11 @@ use crate::DiagnoseError;
 use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
 use crate::config::DiagnosisConfig;
 use crate::costs::Costs;
-use crate::forward::{Accepted, all_but, confirm, known, named};
+use crate::forward::{Accepted, accepted_candidates, all_but, confirm, confirmed_steps};
 use crate::judge::Grade;
 use crate::problem::Candidate;
-use crate::score::{Score, weights};
-use crate::search::{Search, something};
+use crate::score::{Score, bootstrap_weights};
+use crate::search::{Search, is_something_missing};
 
 /// Entries that are scored in the linearised model beside a name, those that the weighing likes best.
 const ALTERNATIVES: usize = 12;
@@ -49,7 +49,7 @@ pub(crate) struct Scored {
 }
 
 /// Settles the names of what was found.
-pub(crate) fn settle(
+pub(crate) fn resolve_names(
     search: &mut Search,
     conditioned_problems: &mut ConditionedProblems<'_>,
     config: &DiagnosisConfig,
@@ -57,12 +57,12 @@ pub(crate) fn settle(
     let begun = specs(&search.accepted);
     names_settled(search, conditioned_problems, config)?;
     if specs(&search.accepted) != begun {
-        let names = named(&search.accepted);
+        let names = accepted_candidates(&search.accepted);
         let curves = search.curves.iter().map(|c| c.candidate.clone());
         search.with_curves =
             conditioned_problems.with(&names.iter().cloned().chain(curves).collect::<Vec<_>>())?;
         search.rest = conditioned_problems.with(&names)?;
-        search.left_over = something(&search.rest, config);
+        search.left_over = is_something_missing(&search.rest, config);
     }
     Ok(())
 }
@@ -73,15 +73,17 @@ fn names_settled(
     config: &DiagnosisConfig,
 ) -> Result<(), DiagnoseError> {
     let curves: Vec<Candidate> = search.curves.iter().map(|c| c.candidate.clone()).collect();
-    let beside = |all: &[Accepted], i: usize| [all_but(&named(all), i), curves.clone()].concat();
+    let beside =
+        |all: &[Accepted], i: usize| [all_but(&accepted_candidates(all), i), curves.clone()].concat();
     let all = search.tentative.iter().enumerate();
     let tentative =
-        all.filter_map(|(i, a)| settled(a, &beside(&search.tentative, i), conditioned_problems, config));
+        all.filter_map(|(i, a)| resolve_name(a, &beside(&search.tentative, i), conditioned_problems, config));
     search.tentative = tentative.collect();
     for round in 1..=ROUNDS {
         let found = std::mem::take(&mut search.accepted);
         let before = specs(&found);
-        let mut in_place = |i: usize| settled(&found[i], &beside(&found, i), conditioned_problems, config);
+        let mut in_place =
+            |i: usize| resolve_name(&found[i], &beside(&found, i), conditioned_problems, config);
         let settled_all: Vec<Option<Accepted>> = (0..found.len()).map(&mut in_place).collect();
         let standing = found.into_iter().zip(settled_all).filter_map(|(found, own)| Some((found, own?)));
         let (found, settled_all): (Vec<Accepted>, Vec<Accepted>) = standing.unzip();
@@ -91,13 +93,13 @@ fn names_settled(
             break;
         }
         // Beside another name one of them may be needed no longer.
-        let steps = known(&named(&search.accepted), &search.rest);
+        let steps = confirmed_steps(&accepted_candidates(&search.accepted), &search.rest);
         let confirmed = confirm(conditioned_problems, steps, &curves, config)?;
         // Each may stand in the place of its name, and all of them not beside each other.
         let found: Vec<Accepted> =
             search.accepted.drain(..).zip(&found).map(|(own, found)| own.told_as(found)).collect();
         let mut says = |names: &[Accepted]| {
-            conditioned_problems.score(&[named(names), curves.clone()].concat(), &search.rest)
+            conditioned_problems.score(&[accepted_candidates(names), curves.clone()].concat(), &search.rest)
         };
         if let (Some(as_found), Some(as_confirmed)) = (says(&found), says(&confirmed))
             && as_found.above(&as_confirmed).is_clear(config.margin_nats)
@@ -133,7 +135,7 @@ fn specs(accepted: &[Accepted]) -> Vec<String> {
 }
 
 /// One of them beside the others; none where no refit says more than nothing, or nothing is the most probable.
-fn settled(
+fn resolve_name(
     found: &Accepted,
     others: &[Candidate],
     conditioned_problems: &mut ConditionedProblems<'_>,
@@ -142,13 +144,13 @@ fn settled(
     let conditioned = found.conditioned.clone();
     let with = |k: usize| [others, std::slice::from_ref(&conditioned.weighed.entries[k].candidate)].concat();
     let mut refits: Vec<(usize, Score)> = Vec::new();
-    for k in near(found, &conditioned, config) {
+    for k in near_entries(found, &conditioned, config) {
         refits.extend(conditioned_problems.score(&with(k), &conditioned).map(|score| (k, score)));
     }
     let nothing =
         conditioned_problems.score(others, &conditioned).unwrap_or_else(|| conditioned.nothing().clone());
     let refits = one_of_each_cause(refits, &conditioned, config);
-    let (set, instead_of) = answer(found, &refits, &nothing, &conditioned, config);
+    let (set, instead_of) = answer_set(found, &refits, &nothing, &conditioned, config);
     let (mut judged, mut grade) = (found.judged.clone(), found.grade);
     let first = *set.first()?;
     if first != judged.entry {
@@ -164,14 +166,15 @@ fn settled(
     }
     // Of the shape of the name it is no other answer.
     let unlisted = judged.unlisted.as_ref().filter(|u| u.cosine <= config.merge_cosine);
-    let ranked = weighed(refits, nothing, unlisted.map(|u| u.score.clone()), &conditioned, config);
+    let ranked =
+        score_probabilities(refits, nothing, unlisted.map(|u| u.score.clone()), &conditioned, config);
     let candidate = conditioned.weighed.entries[judged.entry].candidate.clone();
     let settled = Accepted { candidate, judged, conditioned, grade, set, instead_of, ranked }.doubted();
     (settled.probability(|what| what == Instead::Nothing) <= 0.5).then_some(settled)
 }
 
 /// The entry, and those that one step puts near the best, each name once; a group that holds another one is no other name for it.
-fn near(found: &Accepted, conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Vec<usize> {
+fn near_entries(found: &Accepted, conditioned: &ConditionedProblem, config: &DiagnosisConfig) -> Vec<usize> {
     let weighed = &conditioned.weighed;
     let own = found.judged.entry;
     let mut names = vec![own];
@@ -216,7 +219,7 @@ fn one_of_each_cause(
 }
 
 /// The entries that are one answer, the first to be told first, and the names that the user's knowledge of the arm left out.
-fn answer(
+fn answer_set(
     found: &Accepted,
     refits: &[(usize, Score)],
     nothing: &Score,
@@ -266,7 +269,7 @@ fn simplest_first(mut members: Vec<&(usize, Score)>, costs: Costs<'_>) -> Vec<us
 }
 
 /// Everything that was scored, with its share of the probability.
-fn weighed(
+fn score_probabilities(
     refits: Vec<(usize, Score)>,
     nothing: Score,
     unlisted: Option<Score>,
@@ -284,7 +287,7 @@ fn weighed(
         Instead::Unlisted => costs.of_unlisted(),
     };
     let scores: Vec<(&Score, f64)> = all.iter().map(|(what, score)| (score, cost(*what))).collect();
-    let weights = weights(&scores, config);
+    let weights = bootstrap_weights(&scores, config);
     all.into_iter().zip(weights).map(|((what, score), weight)| Scored { what, score, weight }).collect()
 }
 

@@ -1,9 +1,9 @@
 //! Events that end again: a tool pushed aside for a few dwells, an encoder that came back.
 //!
-//! A recording of n dwells has n^2/2 stretches, so each is tried by what it promises first ([`promise`]), which running
+//! A recording of n dwells has n^2/2 stretches, so each is tried by what it promises first ([`screening_score`]), which running
 //! sums over its dwells give. The best are weighed in full.
 
-use crate::evidence::promise;
+use crate::evidence::screening_score;
 use armcal_core::DwellId;
 use armcal_model::least_dwells;
 use nalgebra::{DMatrix, DVector};
@@ -41,14 +41,14 @@ pub(crate) fn stretches(
     let lengths = LENGTHS.start.max(least)..LENGTHS.end;
     let mut tried: Vec<(f64, (DwellId, usize))> = Vec::new();
     for members in recordings.values() {
-        let sums = running(members, rows, columns, residual);
+        let sums = running_sums(members, rows, columns, residual);
         for from in 0..members.len() {
             for length in lengths.clone().take_while(|length| from + length <= members.len()) {
                 let (first, last) = (dwells[members[from]], dwells[members[from + length - 1]]);
                 // What begins or ends with the session is a step, what all but fills a recording is that recording's.
                 let step = ends.is_some_and(|ends| ends[0] == first || ends[1] == last);
                 if !step && length + least <= members.len() {
-                    tried.push((within(&sums[from], &sums[from + length]), (first, last.dwell)));
+                    tried.push((score_between(&sums[from], &sums[from + length]), (first, last.dwell)));
                 }
             }
         }
@@ -64,13 +64,13 @@ pub(crate) fn stretches(
     Stretches { best: tried.into_iter().map(|(_, stretch)| stretch).collect(), tried: count }
 }
 
-/// What columns promise in the members between two of [`running`] sums.
-pub(crate) fn within(before: &[[f64; 2]], until: &[[f64; 2]]) -> f64 {
-    promise(before.iter().zip(until).map(|(b, a)| [a[0] - b[0], a[1] - b[1]]))
+/// What columns promise in the members between two of [`running_sums`] sums.
+pub(crate) fn score_between(before: &[[f64; 2]], until: &[[f64; 2]]) -> f64 {
+    screening_score(before.iter().zip(until).map(|(b, a)| [a[0] - b[0], a[1] - b[1]]))
 }
 
 /// `X_ik' r_i` and `|X_ik|^2` summed over the members before each, for every column k.
-pub(crate) fn running(
+pub(crate) fn running_sums(
     members: &[usize],
     rows: &[Range<usize>],
     columns: &DMatrix<f64>,

@@ -75,7 +75,7 @@ impl UnknownReport {
         let formula = formula?;
         let mut spec = EffectSpec::new("expression");
         spec.expression = Some(Expression {
-            name: format!("{}_over_{}", word(&self.channel), word(&self.driver)),
+            name: format!("{}_over_{}", as_identifier(&self.channel), as_identifier(&self.driver)),
             formula: formula.formula.clone(),
             acts_on: formula.acts_on.clone(),
         });
@@ -92,6 +92,6 @@ impl UnknownReport {
 }
 
 /// Letters and digits of a name.
-fn word(text: &str) -> String {
+fn as_identifier(text: &str) -> String {
     text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }

@@ -5,12 +5,12 @@ use crate::conditioned_problems::ConditionedProblem;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Series, ShapePoint, UnknownReport};
 use crate::drivers::{Driver, DriverKind, range};
-use crate::evidence::{best_amplitude, coefficients};
-use crate::expression::{expression, to_digits};
-use crate::forward::leading;
+use crate::evidence::{best_amplitude, posterior_coefficients};
+use crate::expression::{fit_expression, to_digits};
+use crate::forward::leading_entries;
 use crate::problem::{Channel, Problem};
 use crate::ripple::{Peak, beside_slow, peak};
-use crate::score::weights;
+use crate::score::bootstrap_weights;
 use crate::weigh::Outside;
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
@@ -31,11 +31,11 @@ pub(crate) fn unknown_report(
 ) -> Option<UnknownReport> {
     let weighed = &conditioned.weighed;
     // A discrepancy that beats every cell knows the driver better than any cell; a cell also knows where.
-    described(conditioned, weighed.best_cell().or_else(|| weighed.best_unlisted())?, config)
+    describe_unlisted(conditioned, weighed.best_cell().or_else(|| weighed.best_unlisted())?, config)
 }
 
 /// Describes one unlisted explanation.
-pub(crate) fn described(
+pub(crate) fn describe_unlisted(
     conditioned: &ConditionedProblem,
     outside: &Outside,
     config: &DiagnosisConfig,
@@ -44,13 +44,13 @@ pub(crate) fn described(
     let (best, ln) = (&outside.what, outside.ln_evidence);
     let gram = weighed.base.gram(&weighed.dense(&best.columns, problem));
     let a = best_amplitude(&gram, &weighed.base, config);
-    let (theta, covariance) = coefficients(&gram, a);
+    let (theta, covariance) = posterior_coefficients(&gram, a);
     let drop = theta.dot(&gram.g);
     let variance = weighed.base.variance_without(drop);
     let effect = weighed.regularised(&best.columns, problem, config);
     let places = weighed.gain(problem, &effect, &conditioned.exam().folds, config);
     let score = conditioned.score_with(&effect);
-    let listed = leading(conditioned, config).into_iter().next();
+    let listed = leading_entries(conditioned, config).into_iter().next();
     let costs = conditioned.costs(config);
     let mut all = vec![(&score, costs.of_unlisted()), (conditioned.nothing(), costs.of_nothing())];
     all.extend(listed.iter().map(|(k, score)| (score, costs.of_entry(*k))));
@@ -59,13 +59,13 @@ pub(crate) fn described(
     let (mut shape, mut strongest, mut series) = (Vec::new(), None, None);
     if let (Some(channel), Some(driver)) = (channel, driver) {
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
-        shape = points(problem, best, driver, axis, &theta, &(covariance * variance));
+        shape = shape_points(problem, best, driver, axis, &theta, &(covariance * variance));
         if channel.name.strip_prefix("joint") == Some(driver.name.trim_start_matches('q')) {
             let per = driver.basis.ncols();
             let curve = best.unit_si * (driver.basis.as_ref() * theta.rows(axis * per, per));
             strongest = peak(&driver.value, curve.as_slice(), per);
             let typical_rad = to_digits(beside_slow(&driver.value, curve.as_slice()), 2);
-            series = Some(Series { harmonics: resolved(&driver.value), typical_rad });
+            series = Some(Series { harmonics: resolved_harmonics(&driver.value), typical_rad });
         }
     }
     // A formula acts on one thing: where the best cell has no such thing, the best one that has.
@@ -82,9 +82,9 @@ pub(crate) fn described(
         let (channel, driver) =
             (&problem.channels[u.what.channel?], &weighed.dependences.drivers[u.what.driver?]);
         let gram = weighed.base.gram(&weighed.dense(&u.what.columns, problem));
-        let (theta, _) = coefficients(&gram, a);
+        let (theta, _) = posterior_coefficients(&gram, a);
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
-        let mut e = expression(problem, weighed, channel, axis, driver, config)?;
+        let mut e = fit_expression(problem, weighed, channel, axis, driver, config)?;
         e.share_of_shape = if drop > 0.0 { (e.share_of_shape / drop).clamp(0.0, 1.0) } else { 0.0 };
         Some(e)
     });
@@ -97,7 +97,7 @@ pub(crate) fn described(
     Some(UnknownReport {
         channel: channel.map_or("displacement", |c| c.name.as_str()).to_string(),
         driver: best.driver_name.clone(),
-        probability: weights(&all, config)[0],
+        probability: bootstrap_weights(&all, config)[0],
         gain_nats: score.above(conditioned.nothing()).nats,
         unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
         shape,
@@ -112,7 +112,7 @@ pub(crate) fn described(
 
 /// Harmonics of a turn that these angles resolve: a half wave of the last one holds [`A_HALF_WAVE`] of them, at their usual
 /// distance.
-fn resolved(angles_rad: &[f64]) -> u32 {
+fn resolved_harmonics(angles_rad: &[f64]) -> u32 {
     let mut sorted = angles_rad.to_vec();
     sorted.sort_by(f64::total_cmp);
     let mut gaps: Vec<f64> = sorted.windows(2).map(|w| w[1] - w[0]).filter(|gap| *gap > 0.0).collect();
@@ -132,7 +132,7 @@ fn strongest_axis(a: &DMatrix<f64>, theta: &DVector<f64>, axes: usize) -> usize 
 }
 
 /// Posterior mean and band of one axis along the driver.
-fn points(
+fn shape_points(
     problem: &Problem,
     best: &Unlisted,
     driver: &Driver,
@@ -180,7 +180,7 @@ fn points(
 
 #[cfg(test)]
 mod tests {
-    use super::resolved;
+    use super::resolved_harmonics;
 
     #[test]
     fn more_poses_resolve_more_of_a_curve() {
@@ -188,9 +188,9 @@ mod tests {
             (0..=n).map(|k| (deg * k as f64 / n as f64).to_radians()).collect()
         };
         // 1.5 deg apart: a half wave of four is 6 deg, 30 of which make half a turn.
-        assert_eq!(resolved(&evenly(60, 90.0)), 30);
-        assert_eq!(resolved(&evenly(1000, 90.0)), 60);
-        assert_eq!(resolved(&evenly(5, 90.0)), 16);
-        assert_eq!(resolved(&[0.4; 7]), 16, "it never turned");
+        assert_eq!(resolved_harmonics(&evenly(60, 90.0)), 30);
+        assert_eq!(resolved_harmonics(&evenly(1000, 90.0)), 60);
+        assert_eq!(resolved_harmonics(&evenly(5, 90.0)), 16);
+        assert_eq!(resolved_harmonics(&[0.4; 7]), 16, "it never turned");
     }
 }

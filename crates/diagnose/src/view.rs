@@ -161,8 +161,8 @@ impl View<'_> {
         let at = spec.marker.as_ref().map(|name| format!("marker {name}")).or(joint);
         match (at, &spec.since) {
             (Some(at), None) => at,
-            (Some(at), Some(since)) => format!("{at} {}", words(since)),
-            (None, Some(since)) => words(since),
+            (Some(at), Some(since)) => format!("{at} {}", describe_since(since)),
+            (None, Some(since)) => describe_since(since),
             (None, None) => {
                 let number = spec.shape.iter().find(|(name, _)| name == "arm").map(|(_, number)| *number);
                 let arms = self.model.chain().arms().iter().enumerate();
@@ -197,7 +197,7 @@ impl View<'_> {
                 load_kg: o.all_loads_kg(),
                 temperature_c: o.temperature_c,
                 place: place.clone(),
-                displaced: moved(linear, pose, &Matrix3::identity(), |_| true),
+                displaced: whitened_displacement(linear, pose, &Matrix3::identity(), |_| true),
                 seat: self.seat(linear, pose),
             }
         };
@@ -215,12 +215,12 @@ impl View<'_> {
         let variances_m2: Vec<f64> =
             all.iter().filter(|o| of_place(o)).map(|o| o.covariance_m2.trace()).collect();
         let sigma_m = (variances_m2.iter().sum::<f64>() / (3 * variances_m2.len()) as f64).sqrt();
-        moved(linear, pose, &axes, |i| of_place(&self.observations[i])) * sigma_m
+        whitened_displacement(linear, pose, &axes, |i| of_place(&self.observations[i])) * sigma_m
     }
 }
 
 /// Whitened rows of a pose when those of its observations are displaced by 1 m along each of three axes.
-fn moved(
+fn whitened_displacement(
     linear: &Linearisation,
     pose: &LinearPose,
     axes: &Matrix3<f64>,
@@ -250,7 +250,7 @@ fn parts(linear: &Linearisation, pose: &LinearPose, observations: &[Observation]
     pose.observations.clone().zip(observations).map(part).collect()
 }
 
-fn words(since: &Since) -> String {
+fn describe_since(since: &Since) -> String {
     match since {
         Since::Recording(recording) => format!("in recording {recording}"),
         Since::Dwell(dwell) => format!("from {dwell} on"),

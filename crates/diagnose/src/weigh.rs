@@ -4,8 +4,8 @@
 use crate::cells::{Dependences, Unlisted, cells, discrepancies};
 use crate::config::DiagnosisConfig;
 use crate::confusion::Crossed;
-use crate::crossval::{EFFECT_PRECISION, Group, compare, left_out};
-use crate::evidence::{best_amplitude, coefficients, ln_bayes, projected};
+use crate::crossval::{EFFECT_PRECISION, Group, compare_left_out, left_out};
+use crate::evidence::{best_amplitude, ln_bayes, posterior_coefficients, project_out_geometry};
 use crate::grams::each_gram;
 use crate::problem::{Candidate, Columns, Problem};
 use crate::projection::{Gram, Projection};
@@ -82,10 +82,10 @@ pub(crate) fn weigh_among(
     dependences: Arc<Dependences>,
     config: &DiagnosisConfig,
 ) -> Weighed {
-    let (mut dependences, mut scale) = (dependences, noise(problem.sigma().powi(2)));
+    let (mut dependences, mut scale) = (dependences, noise_scale(problem.sigma().powi(2)));
     loop {
         let weighed = weigh_at(problem, dependences, scale, config);
-        let found = noise(weighed.best_variance(problem, config));
+        let found = noise_scale(weighed.best_variance(problem, config));
         if found > SETTLED * scale || scale == 1.0 {
             return weighed;
         }
@@ -94,7 +94,7 @@ pub(crate) fn weigh_among(
 }
 
 /// The noise at a residual variance, in units of the declared one: that itself, unless it is far off.
-fn noise(variance: f64) -> f64 {
+fn noise_scale(variance: f64) -> f64 {
     if variance <= RESCALE_ABOVE { 1.0 } else { variance.sqrt() }
 }
 
@@ -107,7 +107,7 @@ fn weigh_at(
 ) -> Weighed {
     let outside =
         [cells(problem, &dependences.drivers, config), discrepancies(problem, &dependences, config)];
-    let base = projected(problem, scale);
+    let base = project_out_geometry(problem, scale);
     let listed = problem.candidates.iter().chain(problem.scans.iter().flat_map(|scan| &scan.points));
     let of_listed: Vec<&Columns> = listed.map(|c| &c.columns).collect();
     let of_unlisted = outside.iter().flatten().map(|u| &u.columns);
@@ -166,7 +166,7 @@ fn weigh_at(
 }
 
 /// What explains most.
-fn first<'c>(all: impl Iterator<Item = (&'c Columns, f64)>) -> Option<(&'c Columns, f64)> {
+fn best_explanation<'c>(all: impl Iterator<Item = (&'c Columns, f64)>) -> Option<(&'c Columns, f64)> {
     all.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -214,7 +214,7 @@ impl Weighed {
     /// The best explanation of all, with its ln Bayes factor.
     pub fn best(&self) -> Option<(&Columns, f64)> {
         let listed = self.entries.iter().map(|e| (&e.candidate.columns, e.ln_evidence));
-        first(listed.chain(self.unlisted.iter().map(|u| (&u.what.columns, u.ln_evidence))))
+        best_explanation(listed.chain(self.unlisted.iter().map(|u| (&u.what.columns, u.ln_evidence))))
     }
 
     /// How errors scatter beside what explains most: of nothing, the best listed and the best unlisted explanation that beside
@@ -226,10 +226,13 @@ impl Weighed {
         let beside = |columns: &Columns| {
             let dense = self.dense(columns, problem);
             let gram = self.base.gram(&dense);
-            let (theta, _) = coefficients(&gram, best_amplitude(&gram, &self.base, config));
+            let (theta, _) = posterior_coefficients(&gram, best_amplitude(&gram, &self.base, config));
             Scatter::of(problem, self, &(self.base.projected_residual() - self.base.project(&dense) * theta))
         };
-        let best = [first(listed), first(unlisted)].into_iter().flatten().filter(|(_, ln)| *ln > 0.0);
+        let best = [best_explanation(listed), best_explanation(unlisted)]
+            .into_iter()
+            .flatten()
+            .filter(|(_, ln)| *ln > 0.0);
         let nothing = Scatter::of(problem, self, &self.base.projected_residual());
         best.map(|(columns, _)| beside(columns))
             .fold(nothing, |a, b| if b.memory() < a.memory() { b } else { a })
@@ -240,7 +243,7 @@ impl Weighed {
         let drop = match self.best() {
             Some((columns, ln)) if ln > 0.0 => {
                 let gram = self.base.gram(&self.dense(columns, problem));
-                coefficients(&gram, best_amplitude(&gram, &self.base, config)).0.dot(&gram.g)
+                posterior_coefficients(&gram, best_amplitude(&gram, &self.base, config)).0.dot(&gram.g)
             }
             _ => 0.0,
         };
@@ -280,7 +283,7 @@ impl Weighed {
     ) -> HeldOut {
         let [before, after] =
             [None, Some(effect)].map(|effect| left_out(problem, effect, groups, self.scale));
-        compare(problem, &before, &after, groups, config)
+        compare_left_out(problem, &before, &after, groups, config)
     }
 
     /// Products of all entries with each other.

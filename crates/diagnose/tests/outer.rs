@@ -4,7 +4,9 @@
 
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate, compare_heldout};
 use armcal_core::{Arrival, DwellId, Observation, Pose, Reference, Severity};
-use armcal_diagnose::{Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, diagnose, nested};
+use armcal_diagnose::{
+    Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, diagnose, nested_validation,
+};
 use armcal_model::{Chain, EffectSpec, Frame, Frames, Model, Session};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -249,7 +251,8 @@ fn a_choice_made_without_the_held_out_points_is_no_better_on_them_than_one_made_
     let before = calibration(&model, &observations);
     let d = diagnosed(&model, &before, &observations);
     let again =
-        with_calibrated(&model, &before, &observations, |c| nested(c, &d, &config()).unwrap()).unwrap();
+        with_calibrated(&model, &before, &observations, |c| nested_validation(c, &d, &config()).unwrap())
+            .unwrap();
     // The effect is there: every turn finds it by itself, and it predicts what had no part in the choice.
     assert_eq!(again.chosen.len(), 5);
     assert!(again.chosen.iter().flatten().all(|e| e.starts_with("backlash:2")), "{:?}", again.chosen);
@@ -263,8 +266,9 @@ fn a_choice_made_without_the_held_out_points_is_no_better_on_them_than_one_made_
     let (model, observations) = observed(&[], 0.0, 2);
     let complete = calibration(&model, &observations);
     let nothing = diagnosed(&model, &complete, &observations);
-    let again =
-        with_calibrated(&model, &complete, &observations, |c| nested(c, &nothing, &config()).unwrap());
+    let again = with_calibrated(&model, &complete, &observations, |c| {
+        nested_validation(c, &nothing, &config()).unwrap()
+    });
     assert_eq!(again, None);
 }
 

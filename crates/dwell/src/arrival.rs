@@ -9,7 +9,7 @@ use std::ops::Range;
 /// `t*` is the last of these rows at which the joint was at least `h_rad` away; the direction is the sign of
 /// `rest - q(t*)`. They begin where the stream does, or where it was last broken: what the joint did in the break is
 /// unknown. No such row: unknown.
-pub(crate) fn arrival(past: &Past<'_>, rows: Range<usize>, rest_rad: f64, h_rad: f64) -> Arrival {
+pub(crate) fn arrival_direction(past: &Past<'_>, rows: Range<usize>, rest_rad: f64, h_rad: f64) -> Arrival {
     let away = |q: f64| (q - rest_rad).abs() >= h_rad;
     let mut blocks = past.blocks_back(rows);
     let with_some = blocks.find(|(_, lowest, highest)| away(*lowest) || away(*highest));
@@ -28,7 +28,7 @@ mod tests {
 
     fn last_arrival(column: &[f64]) -> Arrival {
         let rest = column[column.len() - 1];
-        arrival(&Past::of(column), 0..column.len() - 1, rest, H)
+        arrival_direction(&Past::of(column), 0..column.len() - 1, rest, H)
     }
 
     #[test]
@@ -50,7 +50,7 @@ mod tests {
         assert_eq!(last_arrival(&[0.2; 5]), Arrival::Unknown);
         assert_eq!(last_arrival(&[0.196, 0.204, 0.2]), Arrival::Unknown);
         // The only motion lies before a break of the stream.
-        assert_eq!(arrival(&Past::of(&[0.0, 0.1, 0.2, 0.2]), 2..3, 0.2, H), Arrival::Unknown);
+        assert_eq!(arrival_direction(&Past::of(&[0.0, 0.1, 0.2, 0.2]), 2..3, 0.2, H), Arrival::Unknown);
     }
 
     #[test]
@@ -58,7 +58,7 @@ mod tests {
         let mut column = vec![0.0; 700];
         column.extend(vec![0.1; 5000]);
         assert_eq!(last_arrival(&column), Arrival::Positive);
-        assert_eq!(arrival(&Past::of(&column), 700..5699, 0.1, H), Arrival::Unknown);
-        assert_eq!(arrival(&Past::of(&column), 699..5699, 0.1, H), Arrival::Positive);
+        assert_eq!(arrival_direction(&Past::of(&column), 700..5699, 0.1, H), Arrival::Unknown);
+        assert_eq!(arrival_direction(&Past::of(&column), 699..5699, 0.1, H), Arrival::Positive);
     }
 }

@@ -71,7 +71,7 @@ impl Default for ClockConfig {
 impl ClockConfig {
     /// Checks the values; the key at fault is in the error.
     pub fn check(&self) -> Result<(), DwellError> {
-        let within = |key, value, range, why| within("clock", key, value, range, why);
+        let within = |key, value, range, why| check_range("clock", key, value, range, why);
         within("max_offset_s", self.max_offset_s, 1e-3..=3600.0, "must be between 0.001 and 3600")?;
         within("initial_offset_s", self.initial_offset_s, -9e9..=9e9, "must be a finite number of seconds")?;
         within("max_drift_ppm", self.max_drift_ppm, 0.0..=1e4, "must be between 0 and 10000")?;
@@ -102,9 +102,15 @@ impl ClockConfig {
             (None, None, Some(value)) => refuse("drift_ppm", value, "needs offset_ms beside it"),
             (_, offset_ms, drift_ppm) => {
                 let (offset_ms, drift_ppm) = (offset_ms.unwrap_or(0.0), drift_ppm.unwrap_or(0.0));
-                within(s, "offset_ms", offset_ms, -9e12..=9e12, "must be a finite number of milliseconds")?;
+                check_range(
+                    s,
+                    "offset_ms",
+                    offset_ms,
+                    -9e12..=9e12,
+                    "must be a finite number of milliseconds",
+                )?;
                 let most = self.max_drift_ppm;
-                within(s, "drift_ppm", drift_ppm, -most..=most, "must be within max_drift_ppm")
+                check_range(s, "drift_ppm", drift_ppm, -most..=most, "must be within max_drift_ppm")
             }
         }
     }
@@ -184,7 +190,7 @@ impl Default for DwellConfig {
 impl DwellConfig {
     /// Checks the values; the key at fault is in the error.
     pub fn check(&self) -> Result<(), DwellError> {
-        let within = |key, value, range, why| within("dwell", key, value, range, why);
+        let within = |key, value, range, why| check_range("dwell", key, value, range, why);
         let enter = self.enter_factor;
         within("min_duration_s", self.min_duration_s, 1e-3..=1e6, "must be at least 0.001")?;
         within("window_s", self.window_s, 1e-3..=60.0, "must be between 0.001 and 60")?;
@@ -211,7 +217,7 @@ impl DwellConfig {
     }
 }
 
-fn within(
+fn check_range(
     section: &'static str,
     key: &'static str,
     value: f64,

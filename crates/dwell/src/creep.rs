@@ -17,7 +17,7 @@ const BACK: f64 = 0.2;
 
 /// How far each joint creeps over these rows [rad]; none where one moves otherwise, or further than `most_rad`, or none
 /// moves beyond the tolerance.
-pub(crate) fn of(
+pub(crate) fn joint_creep_rad(
     time_ns: &[i64],
     joint_rad: &[Vec<f64>],
     rows: &Range<usize>,
@@ -74,7 +74,7 @@ pub(crate) struct Line {
 }
 
 /// None for fewer than five values, or without time between them.
-pub(crate) fn line(time_ns: &[i64], values: &[f64]) -> Option<Line> {
+pub(crate) fn fit_line(time_ns: &[i64], values: &[f64]) -> Option<Line> {
     if values.len() < 5 {
         return None;
     }
@@ -88,8 +88,8 @@ pub(crate) fn line(time_ns: &[i64], values: &[f64]) -> Option<Line> {
 }
 
 /// Values without the line that they creep along, and how far that goes from the first to the last.
-pub(crate) fn without(time_ns: &[i64], values: &[f64]) -> Option<(Vec<f64>, f64)> {
-    let line = line(time_ns, values)?;
+pub(crate) fn subtract_line(time_ns: &[i64], values: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let line = fit_line(time_ns, values)?;
     let left = |(t, v): (&i64, &f64)| v - line.slope * (seconds_between(time_ns[0], *t) - line.middle_s);
     Some((time_ns.iter().zip(values).map(left).collect(), line.slope * line.span_s))
 }
@@ -106,7 +106,7 @@ mod tests {
     fn crept(path: impl Fn(f64) -> f64) -> Option<f64> {
         let mut r = Random::new(3);
         let column: Vec<f64> = (0..200).map(|i| path(f64::from(i) * 0.01) + 2e-5 * r.normal()).collect();
-        of(&times(200), &[column], &(0..200), &[9e-5], 6e-3).map(|c| c[0])
+        joint_creep_rad(&times(200), &[column], &(0..200), &[9e-5], 6e-3).map(|c| c[0])
     }
 
     #[test]

@@ -4,9 +4,11 @@ use armcal_core::{Dwell, DwellId, PoseSamples, Samples, Severity, Stage, TipMeas
 use std::ops::Range;
 
 use crate::history::History;
-use crate::pauses::{Encoders, Pauses, Tip, pauses};
+use crate::pauses::{Encoders, Pauses, Tip, find_pauses};
 use crate::series::{check_joints, check_order, check_poses, seconds_between};
-use crate::summary::{effective_of, effort_means, gauge, joint_means, temperature, tip_measurement};
+use crate::summary::{
+    effective_of, effort_means, gauge_reading, joint_means, mean_temperature_c, tip_measurement,
+};
 use crate::{ClockAlignment, DwellConfig, DwellError};
 
 const DOING: &str = "detecting dwells";
@@ -53,7 +55,7 @@ pub fn detect_dwells<'s>(
         .collect();
     // Where nothing sees the tip, a marker tells when the arm stands still.
     let still = tip.as_ref().or(markers.first().map(|(_, marker)| marker));
-    let found = pauses(&encoders, still.filter(|_| config.use_tip), config);
+    let found = find_pauses(&encoders, still.filter(|_| config.use_tip), config);
 
     let summary =
         Summary { samples, encoders: &encoders, tip: tip.as_ref(), markers: &markers, clock, config };
@@ -113,12 +115,12 @@ impl Summary<'_> {
                 })
                 .collect(),
             temperature_c: stream
-                .and_then(|t| temperature(t, start_ns, end_ns, self.config.temperature_max_age_s)),
+                .and_then(|t| mean_temperature_c(t, start_ns, end_ns, self.config.temperature_max_age_s)),
             gauges: self
                 .samples
                 .gauges
                 .iter()
-                .filter_map(|(name, read)| Some((name.clone(), gauge(read, start_ns, end_ns)?)))
+                .filter_map(|(name, read)| Some((name.clone(), gauge_reading(read, start_ns, end_ns)?)))
                 .collect(),
         }
     }
@@ -162,14 +164,14 @@ impl Summary<'_> {
         let varying = |d: &&Dwell| d.joint_spread_rad.iter().any(|s| *s > 0.0);
         let (of, least) = (dwells.len(), self.config.min_effective_samples);
         let poor = dwells.iter().filter(varying).filter(few);
-        warnings.extend(some("few-effective-samples", "dwells", poor, |n, list| {
+        warnings.extend(dwell_notice("few-effective-samples", "dwells", poor, |n, list| {
             format!(
                 "{n} dwells are worth fewer than {least} independent readings ({list}); their standard errors are rough, \
                  hold each pose longer"
             )
         }));
         let blind = dwells.iter().filter(|d| self.tip.is_some() && d.tip.is_none());
-        warnings.extend(some("dwell-without-tip", "dwells", blind, |n, list| {
+        warnings.extend(dwell_notice("dwell-without-tip", "dwells", blind, |n, list| {
             format!(
                 "{n} of {of} dwells have no tip measurement, the sensor did not see the tip then ({list})"
             )
@@ -177,7 +179,7 @@ impl Summary<'_> {
         // They keep what was seen of the others.
         let unseen = |(name, _): &(&String, Tip<'_>)| {
             let blind = dwells.iter().filter(|d| !d.markers.contains_key(*name));
-            some("dwell-without-marker", &format!("marker {name}"), blind, |n, list| {
+            dwell_notice("dwell-without-marker", &format!("marker {name}"), blind, |n, list| {
                 format!(
                     "the sensor saw it in {} of {of} dwells, not in {list}; what else was seen then is used",
                     of - n
@@ -201,7 +203,7 @@ impl Summary<'_> {
             which.len(),
             found.rows.len(),
             by_rad.abs().to_degrees(),
-            list(&which)
+            list_dwells(&which)
         );
         Some(Warning::new(Severity::Notice, Stage::Dwell, "dwell-creeps", "dwells", message))
     }
@@ -238,7 +240,7 @@ impl Summary<'_> {
             );
         }
         if config.use_tip && self.tip.is_some() {
-            let without_tip = pauses(self.encoders, None, config).rows.len();
+            let without_tip = find_pauses(self.encoders, None, config).rows.len();
             if without_tip > 0 {
                 return format!(
                     "no dwells found: the joints stand still {without_tip} times, but the tip stream does not; \
@@ -250,7 +252,7 @@ impl Summary<'_> {
         while joint_floor_deg < LARGEST_FLOOR_DEG {
             joint_floor_deg *= 2.0;
             let looser = DwellConfig { joint_floor_deg, ..config.clone() };
-            let would = pauses(&Encoders::of(&self.samples.joints, &looser), None, &looser).rows.len();
+            let would = find_pauses(&Encoders::of(&self.samples.joints, &looser), None, &looser).rows.len();
             if would > 0 {
                 return format!(
                     "no dwells found: the joints never rest for {} s; if they are meant to, \
@@ -267,14 +269,14 @@ impl Summary<'_> {
 }
 
 /// What is to be noticed of some dwells, given how many and which; nothing of none.
-fn some<'d>(
+fn dwell_notice<'d>(
     code: &'static str,
     subject: &str,
     dwells: impl Iterator<Item = &'d Dwell>,
     message: impl Fn(usize, String) -> String,
 ) -> Option<Warning> {
     let which: Vec<usize> = dwells.map(|d| d.id.dwell).collect();
-    let told = || message(which.len(), list(&which));
+    let told = || message(which.len(), list_dwells(&which));
     (!which.is_empty()).then(|| Warning::new(Severity::Notice, Stage::Dwell, code, subject, told()))
 }
 
@@ -284,7 +286,7 @@ fn moved_rad(from_rad: &[f64], to_rad: &[f64]) -> Vec<f64> {
 }
 
 /// The first few of a list of dwells, in words.
-fn list(dwells: &[usize]) -> String {
+fn list_dwells(dwells: &[usize]) -> String {
     let shown: Vec<String> = dwells.iter().take(8).map(|d| d.to_string()).collect();
     let more = if dwells.len() > 8 { ", ..." } else { "" };
     format!("dwell {}{more}", shown.join(", "))

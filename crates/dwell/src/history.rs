@@ -1,7 +1,7 @@
 //! What each joint went through before a moment: from which side it came, and the turning points a gap remembers.
 
 use crate::DwellConfig;
-use crate::arrival::arrival;
+use crate::arrival::arrival_direction;
 use crate::memory::path_memory;
 use crate::motion_history::Past;
 use crate::pauses::Encoders;
@@ -35,7 +35,7 @@ impl<'a> History<'a> {
                     .arrival_threshold_deg
                     .to_radians()
                     .max(self.config.arrival_threshold_counts * step_rad);
-                arrival(past, rows.clone(), *at_rad, away_rad)
+                arrival_direction(past, rows.clone(), *at_rad, away_rad)
             })
             .collect()
     }

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::creep;
-use crate::series::{breaking_gap_s, median_period_s, seconds_between, typical_period_s, unbroken};
+use crate::series::{breaking_gap_s, median_period_s, seconds_between, typical_period_s, unbroken_runs};
 use crate::stats::quantisation_step;
-use crate::stillness::{Channel, channels, hysteresis};
+use crate::stillness::{Channel, channels_of_columns, hysteresis};
 use crate::{ClockAlignment, DwellConfig};
 
 /// The encoder stream with everything that decides what is still in it.
@@ -55,14 +55,14 @@ impl<'a> Encoders<'a> {
         let time_ns = &joints.time_ns;
         let finite = |i: usize| joints.joint_rad.iter().all(|column| column[i].is_finite());
         let stretches =
-            unbroken(time_ns, breaking_gap_s(config.max_gap_s, typical_period_s(time_ns)), finite);
+            unbroken_runs(time_ns, breaking_gap_s(config.max_gap_s, typical_period_s(time_ns)), finite);
         let step_rad: Vec<f64> =
             joints.joint_rad.iter().map(|c| quantisation_step(c).unwrap_or(0.0)).collect();
         let floor_rad = config.joint_floor_deg.to_radians();
         // A reading that flickers evenly between two counts spreads by half a count, by 0.58 in a window of 4.
         let floors: Vec<f64> = step_rad.iter().map(|step| floor_rad.max(0.75 * step)).collect();
         let window_s = window_s(config, time_ns);
-        let channels = channels(time_ns, &joints.joint_rad, &stretches, window_s, &floors);
+        let channels = channels_of_columns(time_ns, &joints.joint_rad, &stretches, window_s, &floors);
         let over = |factor: f64| -> Vec<f64> {
             channels.iter().zip(&floors).map(|(c, floor)| (factor * c.noise).max(*floor)).collect()
         };
@@ -88,11 +88,13 @@ impl<'a> Tip<'a> {
         let robot_ns: Vec<i64> =
             samples.time_ns.iter().map(|&t| clock.map_or(t, |c| c.to_robot_ns(t))).collect();
         let gap_s = breaking_gap_s(config.max_gap_s, typical_period_s(&robot_ns));
-        let stretches = unbroken(&robot_ns, gap_s, |i| samples.position_m[i].iter().all(|v| v.is_finite()));
+        let stretches =
+            unbroken_runs(&robot_ns, gap_s, |i| samples.position_m[i].iter().all(|v| v.is_finite()));
         let columns: Vec<Vec<f64>> =
             (0..3).map(|axis| samples.position_m.iter().map(|p| p[axis]).collect()).collect();
         let floor_m = config.tip_floor_mm * 1e-3;
-        let axes = channels(&robot_ns, &columns, &stretches, window_s(config, &robot_ns), &[floor_m; 3]);
+        let axes =
+            channels_of_columns(&robot_ns, &columns, &stretches, window_s(config, &robot_ns), &[floor_m; 3]);
         let rms =
             |of: &dyn Fn(&Channel) -> f64| (axes.iter().map(|a| of(a).powi(2)).sum::<f64>() / 3.0).sqrt();
         let noise_m = rms(&|a| a.noise);
@@ -100,7 +102,7 @@ impl<'a> Tip<'a> {
         let level = (0..samples.len()).map(|i| rms(&|a| a.spread[i]) / enter_m).collect();
         let settled_m = 3f64.sqrt() * (config.settle_factor * noise_m).max(floor_m);
         let reach_s = median_period_s(&robot_ns).max(median_period_s(joint_ns)) * 1.5;
-        Tip { samples, nearest: nearest(joint_ns, &robot_ns, reach_s), robot_ns, level, settled_m }
+        Tip { samples, nearest: nearest_rows(joint_ns, &robot_ns, reach_s), robot_ns, level, settled_m }
     }
 
     /// Level of motion at a joint row; none where the tip was not seen.
@@ -115,7 +117,7 @@ impl<'a> Tip<'a> {
 }
 
 /// Finds the pauses.
-pub(crate) fn pauses(encoders: &Encoders, tip: Option<&Tip>, config: &DwellConfig) -> Pauses {
+pub(crate) fn find_pauses(encoders: &Encoders, tip: Option<&Tip>, config: &DwellConfig) -> Pauses {
     let level: Vec<f64> = (0..encoders.joints.len())
         .map(|i| encoders.level(i).max(tip.and_then(|t| t.level(i)).unwrap_or(0.0)))
         .collect();
@@ -151,7 +153,7 @@ pub(crate) fn pauses(encoders: &Encoders, tip: Option<&Tip>, config: &DwellConfi
                 found.too_short_s.push(duration_s);
             } else {
                 found.crept_rad.extend(crept_rad.map(|crept| (found.rows.len(), crept)));
-                found.rows.push(trim(time_ns, run, stretch, config.trim_s));
+                found.rows.push(trim_ends(time_ns, run, stretch, config.trim_s));
             }
         }
     }
@@ -200,7 +202,8 @@ impl Rest<'_> {
         };
         let settled: Vec<&Range<usize>> = parts.iter().filter(settles).collect();
         let (tolerance_rad, most_rad) = (&self.encoders.settled_rad, config.creep_deg.to_radians());
-        let crept = creep::of(time_ns, joints, run, tolerance_rad, most_rad).filter(|_| long_enough(run));
+        let crept = creep::joint_creep_rad(time_ns, joints, run, tolerance_rad, most_rad)
+            .filter(|_| long_enough(run));
         match (&settled[..], crept) {
             // One part without creep is where it has settled; none, or several, are a rest that creeps throughout.
             ([settled], Some(_)) => vec![Still { rows: (*settled).clone(), crept_rad: None }],
@@ -233,7 +236,7 @@ impl Rest<'_> {
                 creeps[i - run.start] |= moved.abs() > least.max(CREEP_SIGMAS * noise * error);
             }
         }
-        unbroken(&time_ns[run.clone()], f64::INFINITY, |i| !creeps[i])
+        unbroken_runs(&time_ns[run.clone()], f64::INFINITY, |i| !creeps[i])
             .into_iter()
             .map(|part| part.start + run.start..part.end + run.start)
             .collect()
@@ -346,13 +349,13 @@ impl Rest<'_> {
 /// How far a straight line through the values moves over their time, and the standard error of that for
 /// values of unit noise. None for fewer than five values.
 fn moved_within(time_ns: &[i64], values: &[f64]) -> Option<(f64, f64)> {
-    let line = creep::line(time_ns, values)?;
+    let line = creep::fit_line(time_ns, values)?;
     Some((line.slope * line.span_s, line.span_s / line.square_s2.sqrt()))
 }
 
 /// Cuts `trim_s` off both ends, but not where the stream itself begins or ends, and never more than a half; nothing of a
 /// pause with so few rows that none would be left.
-fn trim(time_ns: &[i64], run: Range<usize>, stretch: &Range<usize>, trim_s: f64) -> Range<usize> {
+fn trim_ends(time_ns: &[i64], run: Range<usize>, stretch: &Range<usize>, trim_s: f64) -> Range<usize> {
     let (first, last) = (time_ns[run.start], time_ns[run.end - 1]);
     let most_s = trim_s.min(0.25 * seconds_between(first, last));
     let mut kept = run.clone();
@@ -369,7 +372,7 @@ fn trim(time_ns: &[i64], run: Range<usize>, stretch: &Range<usize>, trim_s: f64)
 }
 
 /// For each time the nearest of `candidates` (both increasing), where it lies within `reach_s`.
-fn nearest(times_ns: &[i64], candidates_ns: &[i64], reach_s: f64) -> Vec<Option<usize>> {
+fn nearest_rows(times_ns: &[i64], candidates_ns: &[i64], reach_s: f64) -> Vec<Option<usize>> {
     let mut at = 0;
     let distance_s = |t: i64, i: usize| seconds_between(candidates_ns[i], t).abs();
     let find = |&t: &i64| {
@@ -388,22 +391,23 @@ mod tests {
     #[test]
     fn nearest_rows_are_nearest_and_within_reach() {
         let candidates = [0, 1_000_000_000, 1_100_000_000];
-        let found = nearest(&[-5, 400_000_000, 900_000_000, 1_090_000_000, 3_000_000_000], &candidates, 0.2);
+        let found =
+            nearest_rows(&[-5, 400_000_000, 900_000_000, 1_090_000_000, 3_000_000_000], &candidates, 0.2);
         assert_eq!(found, vec![Some(0), None, Some(1), Some(2), None]);
-        assert_eq!(nearest(&[1, 2], &[], 0.1), vec![None, None]);
+        assert_eq!(nearest_rows(&[1, 2], &[], 0.1), vec![None, None]);
     }
 
     #[test]
     fn trimming_spares_the_ends_of_the_stream() {
         let time_ns: Vec<i64> = (0..100).map(|i| i * 10_000_000).collect();
-        assert_eq!(trim(&time_ns, 0..50, &(0..100), 0.02), 0..48);
-        assert_eq!(trim(&time_ns, 10..100, &(0..100), 0.02), 12..100);
+        assert_eq!(trim_ends(&time_ns, 0..50, &(0..100), 0.02), 0..48);
+        assert_eq!(trim_ends(&time_ns, 10..100, &(0..100), 0.02), 12..100);
     }
 
     #[test]
     fn trimming_leaves_a_pause_of_two_rows_as_it_is() {
         let time_ns: Vec<i64> = (0..10).map(|i| i * 500_000_000).collect();
-        assert_eq!(trim(&time_ns, 4..6, &(0..10), 0.1), 4..6);
-        assert_eq!(trim(&time_ns, 4..7, &(0..10), 0.1), 5..6);
+        assert_eq!(trim_ends(&time_ns, 4..6, &(0..10), 0.1), 4..6);
+        assert_eq!(trim_ends(&time_ns, 4..7, &(0..10), 0.1), 5..6);
     }
 }

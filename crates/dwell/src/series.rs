@@ -32,7 +32,11 @@ pub(crate) fn breaking_gap_s(configured_s: f64, period_s: f64) -> f64 {
 }
 
 /// Maximal runs of usable rows without a gap longer than `max_gap_s`.
-pub(crate) fn unbroken(time_ns: &[i64], max_gap_s: f64, usable: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+pub(crate) fn unbroken_runs(
+    time_ns: &[i64],
+    max_gap_s: f64,
+    usable: impl Fn(usize) -> bool,
+) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut start = None;
     for i in 0..time_ns.len() {
@@ -104,10 +108,10 @@ mod tests {
     #[test]
     fn gaps_and_unusable_rows_break_a_stream() {
         let t = [0, 10, 20, 500, 510, 520, 530].map(|ms: i64| ms * 1_000_000);
-        assert_eq!(unbroken(&t, 0.1, |_| true), vec![0..3, 3..7]);
-        assert_eq!(unbroken(&t, 0.1, |i| i != 4), vec![0..3, 3..4, 5..7]);
-        assert_eq!(unbroken(&t, 1.0, |i| i > 0 && i < 6), vec![1..6]);
-        assert!(unbroken(&[], 1.0, |_| true).is_empty());
+        assert_eq!(unbroken_runs(&t, 0.1, |_| true), vec![0..3, 3..7]);
+        assert_eq!(unbroken_runs(&t, 0.1, |i| i != 4), vec![0..3, 3..4, 5..7]);
+        assert_eq!(unbroken_runs(&t, 1.0, |i| i > 0 && i < 6), vec![1..6]);
+        assert!(unbroken_runs(&[], 1.0, |_| true).is_empty());
     }
 
     #[test]

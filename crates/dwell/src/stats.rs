@@ -36,7 +36,7 @@ impl Mean {
     pub(crate) fn of(values: &[f64], step: f64) -> Option<Mean> {
         let mean = huber_mean(values, step)?;
         let n = values.len() as f64;
-        let residuals = clipped(values, mean, step);
+        let residuals = clipped_deviations(values, mean, step);
         let square: f64 = residuals.iter().map(|r| r * r).sum::<f64>() / n;
         let spread = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt();
         let effective = (square > 0.0).then(|| effective_samples(&residuals));
@@ -51,7 +51,9 @@ impl Mean {
     /// Mean of a column that creeps along a straight line. The rest may have been anywhere on the way: the line from
     /// first to last is a uniform error, and only what is left beside it is noise.
     pub(crate) fn of_creeping(time_ns: &[i64], values: &[f64], step: f64) -> Option<Mean> {
-        let Some((left, crept)) = creep::without(time_ns, values) else { return Mean::of(values, step) };
+        let Some((left, crept)) = creep::subtract_line(time_ns, values) else {
+            return Mean::of(values, step);
+        };
         let level = Mean::of(&left, step)?;
         let spread = level.spread.hypot(crept / 12f64.sqrt());
         Some(Mean { spread, sigma: level.sigma.hypot(crept / 12f64.sqrt()), ..level })
@@ -156,7 +158,7 @@ fn robust_scale(values: &[f64], step: f64) -> f64 {
     step.max(values.iter().map(|v| (v - centre).abs()).sum::<f64>() / values.len().max(1) as f64)
 }
 
-fn clipped(values: &[f64], centre: f64, step: f64) -> Vec<f64> {
+fn clipped_deviations(values: &[f64], centre: f64, step: f64) -> Vec<f64> {
     let limit = CLIP_SIGMAS * robust_scale(values, step);
     values.iter().map(|v| (v - centre).clamp(-limit, limit)).collect()
 }

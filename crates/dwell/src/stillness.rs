@@ -51,7 +51,7 @@ impl Channel {
 }
 
 /// [`Channel::of`] for every column, in order, in parallel.
-pub(crate) fn channels(
+pub(crate) fn channels_of_columns(
     time_ns: &[i64],
     columns: &[Vec<f64>],
     stretches: &[Range<usize>],
@@ -117,11 +117,11 @@ fn spread_within(time_ns: &[i64], column: &[f64], stretch: Range<usize>, window_
         while end < stretch.end && seconds_between(time_ns[i], time_ns[end]) <= 0.5 * window_s {
             end += 1;
         }
-        out[i] = deviation(&column[first..end]);
+        out[i] = standard_deviation(&column[first..end]);
     }
 }
 
-fn deviation(window: &[f64]) -> f64 {
+fn standard_deviation(window: &[f64]) -> f64 {
     let every = window.len().div_ceil(MAX_IN_WINDOW).max(1);
     let used = || window.iter().step_by(every);
     let n = window.len().div_ceil(every);

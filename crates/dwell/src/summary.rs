@@ -46,11 +46,16 @@ pub(crate) fn effort_means(joints: &JointSamples, rows: &Range<usize>) -> Option
         let finite: Vec<f64> = column[rows.clone()].iter().copied().filter(|v| v.is_finite()).collect();
         huber_mean(&finite, 0.0).unwrap_or(f64::NAN)
     };
-    gaps::known(joints.effort_nm.as_ref()?.iter().map(mean).collect())
+    gaps::if_any_known(joints.effort_nm.as_ref()?.iter().map(mean).collect())
 }
 
 /// Temperature of a pause: the mean of its readings, else the neighbours within `max_age_s` interpolated.
-pub(crate) fn temperature(stream: &ScalarSamples, start_ns: i64, end_ns: i64, max_age_s: f64) -> Option<f64> {
+pub(crate) fn mean_temperature_c(
+    stream: &ScalarSamples,
+    start_ns: i64,
+    end_ns: i64,
+    max_age_s: f64,
+) -> Option<f64> {
     let rows = stream.time_ns.len().min(stream.value.len());
     let (time_ns, value) = (&stream.time_ns[..rows], &stream.value[..rows]);
     let first = time_ns.partition_point(|t| *t < start_ns);
@@ -70,7 +75,7 @@ pub(crate) fn temperature(stream: &ScalarSamples, start_ns: i64, end_ns: i64, ma
 }
 
 /// What an instrument read in a pause; none where it read fewer than three times.
-pub(crate) fn gauge(stream: &ScalarSamples, start_ns: i64, end_ns: i64) -> Option<GaugeReading> {
+pub(crate) fn gauge_reading(stream: &ScalarSamples, start_ns: i64, end_ns: i64) -> Option<GaugeReading> {
     let first = stream.time_ns.partition_point(|t| *t < start_ns);
     let end = stream.time_ns.partition_point(|t| *t <= end_ns).max(first);
     let within: Vec<f64> = stream.value[first..end].iter().copied().filter(|v| v.is_finite()).collect();
@@ -98,7 +103,7 @@ pub(crate) fn tip_measurement(
     // The line that the tip creeps along is a uniform error, and only what is left beside it is noise.
     let axis = |k: usize| {
         let column: Vec<f64> = samples.position_m[frames.clone()].iter().map(|p| p[k]).collect();
-        creep::without(&samples.time_ns[frames.clone()], &column)
+        creep::subtract_line(&samples.time_ns[frames.clone()], &column)
     };
     let (Some(x), Some(y), Some(z)) = (axis(0), axis(1), axis(2)) else {
         return pose_mean(samples, frames, floor_m, floor_rad);
@@ -157,16 +162,17 @@ fn at_least(covariance: Matrix3<f64>, floor: f64) -> Option<Matrix3<f64>> {
 pub(crate) fn orientation_mean(orientations: &[UnitQuaternion<f64>]) -> Option<(UnitQuaternion<f64>, f64)> {
     let finite: Vec<UnitQuaternion<f64>> =
         orientations.iter().copied().filter(|q| q.coords.iter().all(|v| v.is_finite())).collect();
-    let first = markley(&finite, |_| 1.0)?;
+    let first = markley_mean(&finite, |_| 1.0)?;
     let angles: Vec<f64> = finite.iter().map(|q| q.angle_to(&first)).collect();
     let limit = HUBER_K * median(&angles) / MEDIAN_NORM_3 * 3f64.sqrt();
-    let mean = markley(&finite, |i| if angles[i] > limit && limit > 0.0 { limit / angles[i] } else { 1.0 })?;
+    let mean =
+        markley_mean(&finite, |i| if angles[i] > limit && limit > 0.0 { limit / angles[i] } else { 1.0 })?;
     let turns: Vec<Vector3<f64>> = finite.iter().map(|q| (mean.inverse() * q).scaled_axis()).collect();
     let cloud = Cloud::of(&turns)?;
     Some((mean, (cloud.covariance_of_mean().trace() / 3.0).sqrt()))
 }
 
-fn markley(
+fn markley_mean(
     orientations: &[UnitQuaternion<f64>],
     weight: impl Fn(usize) -> f64,
 ) -> Option<UnitQuaternion<f64>> {

@@ -3,7 +3,7 @@
 use crate::history::History;
 use crate::pauses::{Encoders, Tip};
 use crate::series::{check_joints, check_poses, seconds_between};
-use crate::summary::temperature;
+use crate::summary::mean_temperature_c;
 use crate::{ClockAlignment, DwellConfig, DwellError};
 use armcal_core::{Arrival, Dwell, JointSamples, Samples, gaps};
 use nalgebra::Vector3;
@@ -82,7 +82,7 @@ pub fn track(
             temperature_c: samples
                 .temperature
                 .as_ref()
-                .and_then(|t| temperature(t, time_ns, time_ns, config.temperature_max_age_s)),
+                .and_then(|t| mean_temperature_c(t, time_ns, time_ns, config.temperature_max_age_s)),
             joint_rad,
             position_m: tip.samples.position_m[row],
         }
@@ -144,7 +144,7 @@ impl Reading {
     }
 
     fn effort_nm(&self, joints: &JointSamples) -> Option<Vec<f64>> {
-        gaps::known(joints.effort_nm.as_ref()?.iter().map(|column| self.between(column)).collect())
+        gaps::if_any_known(joints.effort_nm.as_ref()?.iter().map(|column| self.between(column)).collect())
     }
 
     fn between(&self, column: &[f64]) -> f64 {

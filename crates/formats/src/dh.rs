@@ -83,7 +83,7 @@ fn by_normals(skeleton: &Skeleton, tip: &Place) -> Result<Vec<DhRow>, FormatErro
             let problem = format!("joint `{}` follows another one; urdf and mjcf can say that", bone.name);
             return Err(FormatError::CannotHold { format: Format::DhCsv, problem });
         }
-        lines.push((bone.name.clone(), moving.motion, line(&end, moving)));
+        lines.push((bone.name.clone(), moving.motion, joint_line(&end, moving)));
     }
     end *= tip.link_end;
     let mut frame = Pose::identity();
@@ -95,8 +95,8 @@ fn by_normals(skeleton: &Skeleton, tip: &Place) -> Result<Vec<DhRow>, FormatErro
         (Point3::from(end.translation.vector), end.rotation * Vector3::z()),
     );
     for (name, motion, line) in lines.into_iter().chain([last]) {
-        let row = normal(&frame, &line);
-        frame *= transform(&row);
+        let row = common_normal_row(&frame, &line);
+        frame *= row_transform(&row);
         let (own, moves) = carried.map_or(("base".to_owned(), None), |(name, motion)| (name, Some(motion)));
         rows.push(DhRow { name: own, motion: moves, ..row });
         carried = Some((name, motion));
@@ -104,7 +104,7 @@ fn by_normals(skeleton: &Skeleton, tip: &Place) -> Result<Vec<DhRow>, FormatErro
     // The last frame lies on the right line; what is left is a turn about it and a shift along it.
     let rest = frame.inverse() * end;
     let x = rest.rotation * Vector3::x();
-    rows.push(fixed("end", x.y.atan2(x.x), rest.translation.z, 0.0, 0.0));
+    rows.push(fixed_row("end", x.y.atan2(x.x), rest.translation.z, 0.0, 0.0));
     rows.retain(|row| row.motion.is_some() || !is_nothing(row));
     Ok(rows)
 }
@@ -112,12 +112,12 @@ fn by_normals(skeleton: &Skeleton, tip: &Place) -> Result<Vec<DhRow>, FormatErro
 /// A point and the direction of a line.
 type Line = (Point3<f64>, Vector3<f64>);
 
-fn line(joint: &Pose, moving: &Moving) -> Line {
+fn joint_line(joint: &Pose, moving: &Moving) -> Line {
     (Point3::from(joint.translation.vector), joint.rotation * moving.axis)
 }
 
 /// The row from a frame, along its z, to a frame whose z is the line.
-fn normal(frame: &Pose, (point, direction): &Line) -> DhRow {
+fn common_normal_row(frame: &Pose, (point, direction): &Line) -> DhRow {
     let (p, v) = (frame.inverse_transform_point(point).coords, frame.inverse_transform_vector(direction));
     let across = Vector3::z().cross(&v);
     let (mut x, d_m) = match across.norm() > PARALLEL_RAD {
@@ -130,10 +130,10 @@ fn normal(frame: &Pose, (point, direction): &Line) -> DhRow {
         x = -x;
     }
     let alpha_rad = across.dot(&x).atan2(v.z);
-    fixed("", x.y.atan2(x.x), d_m, p.dot(&x), alpha_rad)
+    fixed_row("", x.y.atan2(x.x), d_m, p.dot(&x), alpha_rad)
 }
 
-fn fixed(name: &str, theta_rad: f64, d_m: f64, a_m: f64, alpha_rad: f64) -> DhRow {
+fn fixed_row(name: &str, theta_rad: f64, d_m: f64, a_m: f64, alpha_rad: f64) -> DhRow {
     DhRow { name: name.to_owned(), motion: None, theta_rad, d_m, a_m, alpha_rad, beta_rad: 0.0 }
 }
 
@@ -142,7 +142,7 @@ fn is_nothing(row: &DhRow) -> bool {
 }
 
 /// `Rz(theta) Tz(d) Tx(a) Rx(alpha)`.
-fn transform(row: &DhRow) -> Pose {
+fn row_transform(row: &DhRow) -> Pose {
     let turn = |axis: Unit<Vector3<f64>>, rad: f64| UnitQuaternion::from_axis_angle(&axis, rad);
     let (s, c) = row.theta_rad.sin_cos();
     let at = Vector3::new(row.a_m * c, row.a_m * s, row.d_m);

@@ -35,7 +35,7 @@ impl Element {
         let mut text = format!("<?xml version=\"1.0\"?>\n<!-- armcal.{mark} -->\n");
         for comment in comments {
             // Two hyphens end no sentence, but a comment.
-            text += &format!("<!-- {} -->\n", plain(comment).replace("--", "- -"));
+            text += &format!("<!-- {} -->\n", without_control_chars(comment).replace("--", "- -"));
         }
         self.write(0, &mut text);
         text
@@ -45,10 +45,13 @@ impl Element {
         let (indent, name) = ("  ".repeat(depth), self.name);
         *out += &format!("{indent}<{name}");
         for (key, value) in &self.attributes {
-            *out += &format!(" {key}=\"{}\"", partial_escape(plain(value)).replace('"', "&quot;"));
+            *out += &format!(
+                " {key}=\"{}\"",
+                partial_escape(without_control_chars(value)).replace('"', "&quot;")
+            );
         }
         match &self.text {
-            Some(text) => *out += &format!(">{}</{name}>\n", partial_escape(plain(text))),
+            Some(text) => *out += &format!(">{}</{name}>\n", partial_escape(without_control_chars(text))),
             None if self.inside.is_empty() => *out += "/>\n",
             None => {
                 *out += ">\n";
@@ -60,6 +63,6 @@ impl Element {
 }
 
 /// Without characters that XML has no way to write.
-fn plain(text: &str) -> String {
+fn without_control_chars(text: &str) -> String {
     text.replace(|c: char| c.is_control() && c != '\n', "_")
 }

@@ -20,7 +20,7 @@ impl Names {
 
 /// The skeleton with names that are there once: links among each other and, where `shared`, joints among them too. Joints keep
 /// theirs.
-pub(crate) fn unique(skeleton: &Skeleton, shared: bool) -> Skeleton {
+pub(crate) fn with_unique_names(skeleton: &Skeleton, shared: bool) -> Skeleton {
     let (mut skeleton, mut names) = (skeleton.clone(), Names::default());
     // What simulators call the world.
     names.fresh("world", "_");
@@ -34,6 +34,6 @@ pub(crate) fn unique(skeleton: &Skeleton, shared: bool) -> Skeleton {
 }
 
 /// The name of the link that a joint carries, or of the root.
-pub(crate) fn link(skeleton: &Skeleton, on: Option<usize>) -> &str {
+pub(crate) fn link_name(skeleton: &Skeleton, on: Option<usize>) -> &str {
     on.map_or(&skeleton.root, |at| &skeleton.joints[at].link)
 }

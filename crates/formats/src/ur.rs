@@ -45,7 +45,7 @@ impl UrKinematics {
     /// # Errors
     /// An arm that is no UR: not six joints that turn, or axes that lie otherwise.
     pub fn of(skeleton: &Skeleton, tip: &Place, by_rows: bool) -> Result<UrKinematics, FormatError> {
-        let joints = six(skeleton, tip)?;
+        let joints = six_joints(skeleton, tip)?;
         let mut origins = [Pose::identity(); 6];
         // What stands before the joint of a row, in the frame of the row; of a URDF that turns the joint's axis to z.
         let mut shifts = [Pose::identity(); 6];
@@ -65,7 +65,7 @@ impl UrKinematics {
                     bone.name,
                     off.to_degrees()
                 );
-                return Err(refused(problem));
+                return Err(cannot_hold(problem));
             }
         }
         let back = shifts[5].inverse();
@@ -130,7 +130,7 @@ pub(crate) fn yaml_number(value: f64) -> String {
 
 /// The six joints on the way to the tip, each with the constant between it and the joint before; the first as it is in the link
 /// that it hangs on.
-fn six<'s>(skeleton: &'s Skeleton, tip: &Place) -> Result<Vec<(&'s Bone, Pose)>, FormatError> {
+fn six_joints<'s>(skeleton: &'s Skeleton, tip: &Place) -> Result<Vec<(&'s Bone, Pose)>, FormatError> {
     let mut way: Vec<usize> = std::iter::successors(tip.on, |at| skeleton.joints[*at].parent).collect();
     way.reverse();
     let mut joints: Vec<(&Bone, Pose)> = Vec::new();
@@ -143,18 +143,18 @@ fn six<'s>(skeleton: &'s Skeleton, tip: &Place) -> Result<Vec<(&'s Bone, Pose)>,
         };
         if moving.motion == Motion::Prismatic || moving.follows.is_some() {
             let how = if moving.follows.is_some() { "follows another joint" } else { "slides" };
-            return Err(refused(format!("joint `{}` {how}, and the six joints of a UR turn", bone.name)));
+            return Err(cannot_hold(format!("joint `{}` {how}, and the six joints of a UR turn", bone.name)));
         }
         joints.push((bone, between * bone.origin));
         between = Pose::identity();
     }
     match joints.len() {
         6 => Ok(joints),
-        n => Err(refused(format!("{n} joints lead to its tip, and a UR has six"))),
+        n => Err(cannot_hold(format!("{n} joints lead to its tip, and a UR has six"))),
     }
 }
 
-fn refused(problem: String) -> FormatError {
+fn cannot_hold(problem: String) -> FormatError {
     let problem = format!("{problem}; urdf, mjcf and sdf hold any arm");
     FormatError::CannotHold { format: Format::UrYaml, problem }
 }

@@ -4,21 +4,21 @@
 //! (<http://wiki.ros.org/urdf/XML/joint>). Tip and markers are links on fixed joints.
 
 use crate::element::Element;
-use crate::names::{link, unique};
+use crate::names::{link_name, with_unique_names};
 use armcal_core::Pose;
 use armcal_model::{Bone, Motion, Moving, Skeleton, roll_pitch_yaw_of, three_numbers};
 
 /// The arm as URDF.
 pub fn urdf(skeleton: &Skeleton) -> String {
-    let skeleton = unique(skeleton, false);
+    let skeleton = with_unique_names(skeleton, false);
     let mut inside = vec![Element::new("link").with("name", &skeleton.root)];
     for bone in &skeleton.joints {
         inside.push(Element::new("link").with("name", &bone.link));
-        inside.push(joint(&skeleton, bone));
+        inside.push(joint_element(&skeleton, bone));
     }
     for place in &skeleton.places {
-        let name = format!("{}_on_{}", place.name, link(&skeleton, place.on));
-        let parts = parts(link(&skeleton, place.on), &place.name, &place.at);
+        let name = format!("{}_on_{}", place.name, link_name(&skeleton, place.on));
+        let parts = joint_parts(link_name(&skeleton, place.on), &place.name, &place.at);
         inside.push(Element::new("link").with("name", &place.name));
         inside.push(Element::new("joint").with("name", name).with("type", "fixed").holding(parts));
     }
@@ -32,16 +32,20 @@ pub fn urdf(skeleton: &Skeleton) -> String {
 }
 
 /// The pose as `<origin>`.
-pub(crate) fn origin(pose: &Pose) -> Element {
+pub(crate) fn origin_element(pose: &Pose) -> Element {
     let (xyz, rpy) = (three_numbers(&pose.translation.vector), three_numbers(&roll_pitch_yaw_of(pose)));
     Element::new("origin").with("xyz", xyz).with("rpy", rpy)
 }
 
-fn parts(parent: &str, child: &str, at: &Pose) -> [Element; 3] {
-    [Element::new("parent").with("link", parent), Element::new("child").with("link", child), origin(at)]
+fn joint_parts(parent: &str, child: &str, at: &Pose) -> [Element; 3] {
+    [
+        Element::new("parent").with("link", parent),
+        Element::new("child").with("link", child),
+        origin_element(at),
+    ]
 }
 
-fn joint(skeleton: &Skeleton, bone: &Bone) -> Element {
+fn joint_element(skeleton: &Skeleton, bone: &Bone) -> Element {
     let kind = match &bone.moves {
         None => "fixed",
         Some(Moving { motion: Motion::Prismatic, .. }) => "prismatic",
@@ -49,7 +53,7 @@ fn joint(skeleton: &Skeleton, bone: &Bone) -> Element {
         Some(_) => "revolute",
     };
     let element = Element::new("joint").with("name", &bone.name).with("type", kind);
-    let element = element.holding(parts(link(skeleton, bone.parent), &bone.link, &bone.origin));
+    let element = element.holding(joint_parts(link_name(skeleton, bone.parent), &bone.link, &bone.origin));
     let Some(moving) = &bone.moves else { return element };
     let limit = Element::new("limit");
     let limit = match (moving.limits, kind) {

@@ -15,7 +15,7 @@ pub const HOW: [&str; 2] = [
 pub fn xacro(origins: &[(&str, Pose)]) -> String {
     let entry = |(joint, pose): &(&str, Pose)| {
         let (xyz, rpy) = (three_numbers(&pose.translation.vector), three_numbers(&roll_pitch_yaw_of(pose)));
-        format!("({}, ['{xyz}', '{rpy}'])", quoted(joint))
+        format!("({}, ['{xyz}', '{rpy}'])", python_string(joint))
     };
     let table =
         format!("${{dict([\n    {}])}}", origins.iter().map(entry).collect::<Vec<_>>().join(",\n    "));
@@ -30,7 +30,7 @@ pub fn xacro(origins: &[(&str, Pose)]) -> String {
 }
 
 /// A name as Python has it; a brace would end the expression.
-fn quoted(name: &str) -> String {
+fn python_string(name: &str) -> String {
     let mut text = String::from("'");
     for c in name.chars() {
         match c {

@@ -60,7 +60,7 @@ impl JointZeros {
                 normal += jacobian.transpose() * &jacobian;
                 towards += jacobian.transpose() * residual.position_m;
             }
-            let step = least(normal, &towards);
+            let step = minimum_norm_solution(normal, &towards);
             for (k, (step, scale)) in step.iter().zip(&scales).enumerate() {
                 match joints.get(k) {
                     Some(joint) => zeros.offset[*joint] += step * scale,
@@ -109,7 +109,7 @@ impl JointZeros {
 }
 
 /// The shortest solution of `normal x = towards`.
-fn least(normal: DMatrix<f64>, towards: &DVector<f64>) -> DVector<f64> {
+fn minimum_norm_solution(normal: DMatrix<f64>, towards: &DVector<f64>) -> DVector<f64> {
     let eigen = SymmetricEigen::new(normal);
     let most = eigen.eigenvalues.amax();
     let mut x = DVector::zeros(towards.len());

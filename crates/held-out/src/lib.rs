@@ -1,7 +1,7 @@
 //! A calibrated model on recordings that were held out of its calibration.
 //!
-//! [`verify`] compares the result of an earlier run with new recordings, in points, paths and by ISO 9283; [`transfers`] and
-//! [`between`] ask of every effect whether what it learnt in some recordings, or in another session, lowers the error in others.
+//! [`verify`] compares the result of an earlier run with new recordings, in points, paths and by ISO 9283; [`transfer_between_recordings`] and
+//! [`transfer_between_sessions`] ask of every effect whether what it learnt in some recordings, or in another session, lowers the error in others.
 //! `past` puts an arm that was calibrated elsewhere among the frames of here. What is told of it all is in `report`.
 
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
@@ -12,5 +12,7 @@ mod transfer;
 mod verify;
 
 pub use error::HeldOutError;
-pub use transfer::{Asked, LeftOut, SessionTransfer, Transfer, between, transfers};
+pub use transfer::{
+    Asked, LeftOut, SessionTransfer, Transfer, transfer_between_recordings, transfer_between_sessions,
+};
 pub use verify::verify;

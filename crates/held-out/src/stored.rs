@@ -18,7 +18,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// A nominal arm that differs from the one that was calibrated, or a parameter the result does not have.
-pub fn place(
+pub fn place_model(
     past: &StoredModel,
     result: &Path,
     pipeline: &Pipeline,
@@ -30,7 +30,7 @@ pub fn place(
 /// The same of arms at hand; `origin` is the file they come from.
 ///
 /// # Errors
-/// As [`place`].
+/// As [`place_model`].
 pub fn place_arms(
     then: &StoredArms,
     session: &Session,
@@ -40,7 +40,7 @@ pub fn place_arms(
 ) -> Result<Placed, HeldOutError> {
     let mut warnings = Vec::new();
     let specs = then.model.effects().iter().map(|e| e.spec.clone());
-    let lasting: Vec<EffectSpec> = specs.filter(|s| lasts(s, &mut warnings)).collect();
+    let lasting: Vec<EffectSpec> = specs.filter(|s| is_lasting(s, &mut warnings)).collect();
     let model = if lasting.is_empty() {
         surroundings.clone()
     } else {
@@ -76,7 +76,7 @@ pub fn place_arms(
     warnings.extend(tip_overruled(then, pipeline, &model));
     for arm in 0..model.chain().bases() {
         let now = model.arm_base_in_world(&nominal, arm);
-        put_frame(model.base_parameters(arm), (now, base(then, pipeline, arm, &now)), &mut calibrated);
+        put_frame(model.base_parameters(arm), (now, base_pose(then, pipeline, arm, &now)), &mut calibrated);
     }
     Ok(Placed { model, nominal, calibrated, warnings })
 }
@@ -96,7 +96,7 @@ fn tip_overruled(then: &StoredArms, pipeline: &Pipeline, model: &Model) -> Optio
 }
 
 /// Whether an effect holds beyond the recordings it was fitted on; what time does to it is doubtful.
-pub fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
+pub fn is_lasting(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
     let mut say = |code, message: &str| {
         warnings.push(Warning::new(
             Severity::Notice,
@@ -121,7 +121,7 @@ pub fn lasts(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
 }
 
 /// The base of an arm as far as calibration and the new recordings know it together.
-fn base(then: &StoredArms, pipeline: &Pipeline, arm: usize, now: &Pose) -> Pose {
+fn base_pose(then: &StoredArms, pipeline: &Pipeline, arm: usize, now: &Pose) -> Pose {
     let measured = then.model.arm_base_in_world(&then.model.nominal(), arm);
     let calibrated = then.model.arm_base_in_world(&then.values, arm);
     let of_arm = pipeline.two_arms.as_ref().and_then(|two| two.arms.get(arm));

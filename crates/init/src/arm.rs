@@ -6,7 +6,7 @@ use crate::error::InitError;
 use armcal_core::Pose;
 use armcal_model::{Chain, Model, check_xml};
 use armcal_recording::input::Kind;
-use armcal_stages::frames::bare;
+use armcal_stages::frames::bare_model;
 use roxmltree::{Document, Node};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,7 +65,7 @@ impl Arm {
     /// The same arm with the tip at another link.
     pub fn model_to(&self, tip: &str) -> Result<Model, InitError> {
         let base = self.base_link.as_deref().unwrap_or_default();
-        Ok(bare(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())?)
+        Ok(bare_model(&Chain::from_urdf(&self.text, base, tip, &self.file)?, Vec::new())?)
     }
 
     /// The links that the tip may be, of a URDF, with their places on the first of them. They are fixed to each other, so all of
@@ -77,7 +77,7 @@ impl Arm {
         let base = self.base_link.as_deref().unwrap_or_default();
         let others: Vec<&str> = others.iter().map(String::as_str).collect();
         let chain = Chain::from_urdf_branches(&self.text, base, first, &others, &self.file)?;
-        let (model, zeros) = (bare(&chain, Vec::new())?, vec![0.0; chain.joint_names().len()]);
+        let (model, zeros) = (bare_model(&chain, Vec::new())?, vec![0.0; chain.joint_names().len()]);
         let frames = model.link_frames(&model.nominal(), &zeros);
         let in_base: BTreeMap<&str, Pose> = frames.iter().map(|f| (f.name.as_str(), f.in_base)).collect();
         let first = in_base.get(first.as_str()).map_or(Pose::identity(), Pose::inverse);
@@ -126,9 +126,9 @@ pub fn find(
     let mut refused = None;
     for joints in ways.into_iter().filter(|way| !way.is_empty()) {
         let way = Channels { joints, urdfs: channels.urdfs.clone(), ..Channels::default() };
-        match found(told, &way, folders, beside) {
+        match resolve_arm(told, &way, folders, beside) {
             Ok(mut arm) => {
-                arm.unsure.extend(rivals(&arm.source, channels));
+                arm.unsure.extend(other_fields_note(&arm.source, channels));
                 return Ok(arm);
             }
             Err(error) => _ = refused.get_or_insert(error),
@@ -138,7 +138,7 @@ pub fn find(
 }
 
 /// The other fields that the joints may be in.
-fn rivals(own: &JointTopic, channels: &Channels) -> Option<String> {
+fn other_fields_note(own: &JointTopic, channels: &Channels) -> Option<String> {
     let Field { values, why, .. } = own.field.as_ref()?;
     let as_many =
         |j: &&JointTopic| j.field.as_ref().is_some_and(|f| f.values == *values) && j.shown() != own.shown();
@@ -164,7 +164,7 @@ fn urdfs_in(folders: &BTreeSet<PathBuf>) -> Vec<PathBuf> {
     found
 }
 
-fn found(
+fn resolve_arm(
     told: &Told,
     channels: &Channels,
     folders: &BTreeSet<PathBuf>,
@@ -197,7 +197,7 @@ fn found(
 }
 
 fn no_arm(channels: &Channels, why: &str) -> InitError {
-    let names = channels.joints.iter().map(|j| format!("{} ({})", j.shown(), said(j)));
+    let names = channels.joints.iter().map(|j| format!("{} ({})", j.shown(), describe_joints(j)));
     let problem = format!(
         "nothing says what the arm is: {why}; give --urdf FILE or --dh FILE (docs/guide.md shows one). Recorded joints: {}",
         names.collect::<Vec<_>>().join("; ")
@@ -206,7 +206,7 @@ fn no_arm(channels: &Channels, why: &str) -> InitError {
 }
 
 /// The joints of a topic in words.
-fn said(joints: &JointTopic) -> String {
+fn describe_joints(joints: &JointTopic) -> String {
     match &joints.field {
         Some(field) if joints.names.is_empty() => format!("{} numbers", field.values),
         _ => joints.names.join(", "),
@@ -226,7 +226,7 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, InitErr
         Some(found) => found,
         None => {
             // A table may name its rows as it likes: as many joints on one topic are taken in their order.
-            let mut alike = chosen(told, channels).filter(|j| j.names.len() == rows.len());
+            let mut alike = candidate_topics(told, channels).filter(|j| j.names.len() == rows.len());
             let Some(only) = alike.next() else { return Err(other_joints(channels, &rows, path)) };
             unsure.push(format!(
                 "the rows of {} are called {}, the recorded joints {}: they are taken in this order",
@@ -237,8 +237,8 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, InitErr
             (only.clone(), only.names.clone())
         }
     };
-    unsure.extend(others(told, channels, &source.topic, &names));
-    let model = bare(&chain, Vec::new())?;
+    unsure.extend(other_topic_notes(told, channels, &source.topic, &names));
+    let model = bare_model(&chain, Vec::new())?;
     Ok(Arm {
         file: path.to_owned(),
         text,
@@ -255,7 +255,7 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, InitErr
 }
 
 fn other_joints(channels: &Channels, model: &[String], path: &Path) -> InitError {
-    let topics = channels.joints.iter().map(|j| format!("{} has {}", j.shown(), said(j)));
+    let topics = channels.joints.iter().map(|j| format!("{} has {}", j.shown(), describe_joints(j)));
     let problem = format!(
         "no topic has the joints of {} ({}): {}",
         path.display(),
@@ -266,14 +266,15 @@ fn other_joints(channels: &Channels, model: &[String], path: &Path) -> InitError
 }
 
 /// The topics that may be meant.
-fn chosen<'a>(told: &'a Told, channels: &'a Channels) -> impl Iterator<Item = &'a JointTopic> {
+fn candidate_topics<'a>(told: &'a Told, channels: &'a Channels) -> impl Iterator<Item = &'a JointTopic> {
     channels.joints.iter().filter(|j| told.joints.as_ref().is_none_or(|asked| is_called(j, asked)))
 }
 
 /// Other topics that have the same joints: of another arm, of set-points, or of a driver beside the first.
-fn others(told: &Told, channels: &Channels, topic: &str, names: &[String]) -> Vec<String> {
+fn other_topic_notes(told: &Told, channels: &Channels, topic: &str, names: &[String]) -> Vec<String> {
     let has_all = |j: &&JointTopic| j.topic != topic && names.iter().all(|name| j.names.contains(name));
-    let others: Vec<&str> = chosen(told, channels).filter(has_all).map(|j| j.topic.as_str()).collect();
+    let others: Vec<&str> =
+        candidate_topics(told, channels).filter(has_all).map(|j| j.topic.as_str()).collect();
     let told = format!("{topic} is read; {} has the same joints, and --joints chooses it", others.join(", "));
     if others.is_empty() { Vec::new() } else { vec![told] }
 }
@@ -287,8 +288,8 @@ fn topic_of(told: &Told, channels: &Channels, joints: &[String]) -> Option<(Join
     };
     // Of fields the first: they are in the order of what speaks for them.
     let most = |j: &&JointTopic| j.field.is_none().then(|| (Reverse(j.messages), j.topic.clone()));
-    let found = chosen(told, channels).filter(has_all).min_by_key(most);
-    found.or_else(|| chosen(told, channels).find(unnamed)).map(|j| (j.clone(), joints.to_vec()))
+    let found = candidate_topics(told, channels).filter(has_all).min_by_key(most);
+    found.or_else(|| candidate_topics(told, channels).find(unnamed)).map(|j| (j.clone(), joints.to_vec()))
 }
 
 /// A joint of a URDF.
@@ -312,14 +313,15 @@ fn from_urdf(
     let document =
         Document::parse(&text).map_err(|e| bad(format!("is no XML: {e}; a DH table is given with --dh")))?;
     let joints = joints_of(document.root_element());
-    let named: BTreeSet<&str> = chosen(told, channels).flat_map(|j| &j.names).map(String::as_str).collect();
-    let unnamed = named.is_empty() && chosen(told, channels).next().is_some();
+    let named: BTreeSet<&str> =
+        candidate_topics(told, channels).flat_map(|j| &j.names).map(String::as_str).collect();
+    let unnamed = named.is_empty() && candidate_topics(told, channels).next().is_some();
     let is_read = |l: &Link<'_>| l.moves && (unnamed || named.contains(l.joint));
     // Fingers: joints that share a parent link and end there.
     let mut read_on: BTreeMap<&str, usize> = BTreeMap::new();
     joints.values().filter(|l| is_read(l)).for_each(|l| *read_on.entry(l.parent).or_default() += 1);
     let counts = |l: &Link<'_>| is_read(l) && !(l.slides && read_on[l.parent] > 1);
-    let depths = depths(&joints, counts);
+    let depths = joint_depths(&joints, counts);
     let depth = |link: &&str| depths[link];
     let ends: Vec<&str> = joints.iter().filter(|(_, l)| counts(l)).map(|(child, _)| *child).collect();
     let deepest = ends.iter().map(&depth).max().unwrap_or(0);
@@ -329,7 +331,7 @@ fn from_urdf(
             let known = known.ok_or_else(|| InitError::Usage {
                 problem: at(format!("--tip-link {tip} is no link of it")),
             })?;
-            path(&joints, known).into_iter().rev().find(|link| counts(&joints[link]))
+            link_path(&joints, known).into_iter().rev().find(|link| counts(&joints[link]))
         }
         None => {
             let all: Vec<&str> = ends.iter().copied().filter(|end| depth(end) == deepest).collect();
@@ -347,7 +349,7 @@ fn from_urdf(
         let known: Vec<String> = joints.values().filter(|l| l.moves).map(|l| l.joint.to_owned()).collect();
         return Err(other_joints(channels, &known, &file));
     };
-    let way = path(&joints, end);
+    let way = link_path(&joints, end);
     let behind =
         way.iter().rposition(|link| joints[link].moves && !counts(&joints[link])).map_or(0, |at| at + 1);
     let moving: Vec<&str> = way[behind..].iter().copied().filter(|link| joints[link].moves).collect();
@@ -374,11 +376,11 @@ fn from_urdf(
             model_joints.join(", ")
         )));
     }
-    let model = bare(&chain, Vec::new())?;
+    let model = bare_model(&chain, Vec::new())?;
     let mut links: BTreeSet<String> = joints.keys().map(|link| (*link).to_owned()).collect();
     links.extend(joints.values().map(|l| l.parent.to_owned()));
     let carried = moving.iter().map(|link| (*link).to_owned()).collect();
-    let mut unsure = others(told, channels, &source.topic, &names);
+    let mut unsure = other_topic_notes(told, channels, &source.topic, &names);
     if unnamed {
         let said = format!("{} names no joints: they are read in the order of the model", source.shown());
         unsure.push(said);
@@ -405,7 +407,7 @@ fn joints_of<'a>(robot: Node<'a, '_>) -> BTreeMap<&'a str, Link<'a>> {
 }
 
 /// The links from behind the root to this one.
-fn path<'a>(joints: &BTreeMap<&'a str, Link<'a>>, link: &str) -> Vec<&'a str> {
+fn link_path<'a>(joints: &BTreeMap<&'a str, Link<'a>>, link: &str) -> Vec<&'a str> {
     let mut way: Vec<&str> = Vec::new();
     let mut at = link;
     while let Some((link, joint)) = joints.get_key_value(at).filter(|_| way.len() <= joints.len()) {
@@ -417,7 +419,7 @@ fn path<'a>(joints: &BTreeMap<&'a str, Link<'a>>, link: &str) -> Vec<&'a str> {
 }
 
 /// How many joints that count lead from the root to each link, itself included: each is asked once, however they hang together.
-fn depths<'a>(
+fn joint_depths<'a>(
     joints: &BTreeMap<&'a str, Link<'a>>,
     counts: impl Fn(&Link<'_>) -> bool,
 ) -> BTreeMap<&'a str, usize> {

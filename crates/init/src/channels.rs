@@ -4,7 +4,7 @@ use super::fields::{Field, Fields};
 use super::files::Opened;
 use crate::error::InitError;
 use armcal_recording::decode::{Plan, Role, Rows, readable_as};
-use armcal_recording::{RawChannel, RawSchema, RecordingError, inflated};
+use armcal_recording::{RawChannel, RawSchema, RecordingError, inflate_message};
 use armcal_stages::RunError;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -92,7 +92,7 @@ struct Found {
 }
 
 /// Looks into every recording.
-pub fn look(opened: &[Opened]) -> Result<Channels, InitError> {
+pub fn scan_recordings(opened: &[Opened]) -> Result<Channels, InitError> {
     let mut found: BTreeMap<String, Found> = BTreeMap::new();
     let mut fields: BTreeMap<String, Fields> = BTreeMap::new();
     let mut channels = Channels::default();
@@ -130,7 +130,7 @@ pub fn look(opened: &[Opened]) -> Result<Channels, InitError> {
                 if topic.messages > FIRST && topic.messages % EVERY > 1 {
                     return Ok(());
                 }
-                let Ok(data) = inflated(message.data, &allowance) else { return Ok(()) };
+                let Ok(data) = inflate_message(message.data, &allowance) else { return Ok(()) };
                 if let Some(fields) = fields.get_mut(&message.channel.topic) {
                     fields.add(topic.messages, message.log_ns as i64, &data);
                 }

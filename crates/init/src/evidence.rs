@@ -1,12 +1,12 @@
 //! What the recordings say of each body: how far it went, where it was in every pause of the arm, which link it followed.
 
 use super::arm::Arm;
-use super::motion::{Likeness, Speeds, likeness};
+use super::motion::{Likeness, Speeds, compare_speeds};
 use super::read::{AllRead, Read};
 use armcal_core::robust::{median, percentile};
 use armcal_core::{Pose, PoseSamples};
 use armcal_dwell::mean_pose;
-use armcal_stages::links::{Placed, place, turned_apart};
+use armcal_stages::links::{Placed, place_on_link, turned_apart};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Noise of positions [m] and turns [rad] below which no link is better than another.
@@ -137,8 +137,8 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
         let tip_m = |i: usize| arm.model.tip_in_base(&nominal, &joints.row_rad(i)).translation.vector;
         let speeds = Speeds::of(&joints.time_ns, tip_m);
         let alike = |at: usize| {
-            let seen = recording.body(at).filter(|seen| travel(seen).1 > STANDS_M)?;
-            likeness(&speeds, &Speeds::of(&seen.time_ns, |i| seen.position_m[i]))
+            let seen = recording.body(at).filter(|seen| median_and_travel_m(seen).1 > STANDS_M)?;
+            compare_speeds(&speeds, &Speeds::of(&seen.time_ns, |i| seen.position_m[i]))
         };
         let likenesses: Vec<Option<Likeness>> = (0..all.len()).map(alike).collect();
         // The bodies have one clock: the one that is most alike tells how late it is.
@@ -158,7 +158,7 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
 pub const STANDS_M: f64 = 0.01;
 
 /// Median position and travel [m].
-fn travel(seen: &PoseSamples) -> (Vector3<f64>, f64) {
+fn median_and_travel_m(seen: &PoseSamples) -> (Vector3<f64>, f64) {
     let axis = |k: usize| median(&seen.position_m.iter().map(|p| p[k]).collect::<Vec<_>>());
     let middle_m = Vector3::new(axis(0), axis(1), axis(2));
     let off: Vec<f64> = seen.position_m.iter().map(|p| (p - middle_m).norm()).collect();
@@ -172,7 +172,7 @@ fn in_recording(
     likeness: Option<Likeness>,
     poses: &[Vec<Pose>],
 ) -> InRecording {
-    let (middle_m, travel_m) = travel(seen);
+    let (middle_m, travel_m) = median_and_travel_m(seen);
     let delay_ns = (delay_s * 1e9) as i64;
     let pause = |(dwell, d): (usize, &armcal_core::Dwell)| {
         let from = seen.time_ns.partition_point(|t| *t < d.start_ns + delay_ns);
@@ -193,7 +193,7 @@ fn in_recording(
         let seen_m: Vec<Vector3<f64>> = pauses.iter().map(|p| p.at_m).collect();
         let turned: Option<Vec<_>> = pauses.iter().map(|p| p.turned).collect();
         let apart = turned.map_or(f64::NAN, |turned| turned_apart(&own, &turned));
-        Some((place(&own, &seen_m)?, apart))
+        Some((place_on_link(&own, &seen_m)?, apart))
     };
     let moves = travel_m > STANDS_M;
     let on_links = if moves { (0..links).map(on_link).collect() } else { Vec::new() };

@@ -21,13 +21,15 @@ pub struct Opened {
 /// Opens what the user named: files, globs, folders. Files of one rosbag2 folder are one recording, and so are
 /// `NAME_0.mcap`, `NAME_1.mcap`, .. (or `.db3`) of a folder that follow each other in time.
 pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, InitError> {
-    inputs.iter().try_for_each(|input| refuse(Path::new(input)))?;
+    inputs.iter().try_for_each(|input| refuse_non_recording(Path::new(input)))?;
     let entries = Manifest::of(inputs, out)?.entries;
-    let opened = entries.into_iter().map(open).collect::<Result<Vec<Opened>, InitError>>()?;
+    let opened = entries.into_iter().map(open_entry).collect::<Result<Vec<Opened>, InitError>>()?;
     let mut whole: Vec<Vec<Opened>> = Vec::new();
     for next in opened {
         match whole.last_mut() {
-            Some(parts) if parts.last().is_some_and(|before| continues(before, &next)) => parts.push(next),
+            Some(parts) if parts.last().is_some_and(|before| is_continuation(before, &next)) => {
+                parts.push(next)
+            }
             _ => whole.push(vec![next]),
         }
     }
@@ -35,24 +37,24 @@ pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, InitError>
         1 => parts.pop().map(Ok),
         _ => {
             let paths: Vec<PathBuf> = parts.iter().flat_map(|part| part.entry.paths.clone()).collect();
-            let name = paths.first().and_then(|path| part(path)).map(|(name, _)| name);
+            let name = paths.first().and_then(|path| split_part_number(path)).map(|(name, _)| name);
             // Opened once more, however many they are.
-            parts.pop().map(|last| open(RecordingEntry { name, paths, ..last.entry }))
+            parts.pop().map(|last| open_entry(RecordingEntry { name, paths, ..last.entry }))
         }
     };
     whole.into_iter().filter_map(joined).collect()
 }
 
-fn open(entry: RecordingEntry) -> Result<Opened, InitError> {
+fn open_entry(entry: RecordingEntry) -> Result<Opened, InitError> {
     let failed = |source| RunError::Recording { recording: entry.name(), source };
     let recording = Recording::open(&entry.paths).map_err(failed)?;
     Ok(Opened { entry, recording })
 }
 
 /// Whether a recording begins where the one before was split.
-fn continues(before: &Opened, next: &Opened) -> bool {
+fn is_continuation(before: &Opened, next: &Opened) -> bool {
     let [last, first] =
-        [before.entry.paths.last(), next.entry.paths.first()].map(|p| p.and_then(|p| part(p)));
+        [before.entry.paths.last(), next.entry.paths.first()].map(|p| p.and_then(|p| split_part_number(p)));
     let in_order = last.zip(first).is_some_and(|((a, i), (b, j))| a == b && i + 1 == j);
     if !in_order || before.entry.paths[0].parent() != next.entry.paths[0].parent() {
         return false;
@@ -68,7 +70,7 @@ fn continues(before: &Opened, next: &Opened) -> bool {
 }
 
 /// `NAME_3.mcap` is part 3 of `NAME`.
-fn part(path: &Path) -> Option<(String, u64)> {
+fn split_part_number(path: &Path) -> Option<(String, u64)> {
     let stem = without_ending(path);
     let stem = stem.file_name()?.to_str()?;
     let (name, number) = stem.rsplit_once('_')?;
@@ -76,7 +78,7 @@ fn part(path: &Path) -> Option<(String, u64)> {
 }
 
 /// What is no recording is told for what it is, with the way to one.
-fn refuse(path: &Path) -> Result<(), InitError> {
+fn refuse_non_recording(path: &Path) -> Result<(), InitError> {
     let refused = |why: String| Err(ConfigError::Recordings { what: path.display().to_string(), why }.into());
     if is_url(path) {
         return Ok(());

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Gives bodies the root of their tree as frame, where tracked ones hang on different frames; what no transforms join to it is
 /// left out and told. Transforms on `.._static` topics join others and are nothing that is tracked.
-pub fn join(
+pub fn assign_root_frames(
     bodies: &mut Vec<BodyTopic>,
     opened: &[Opened],
     left: &mut Vec<(String, String)>,

@@ -65,7 +65,8 @@ pub struct Asked {
 pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitError> {
     progress.step("opening the recordings");
     let opened = files::open_all(&asked.inputs, &asked.out)?;
-    let points = asked.points.iter().map(|path| points::look(path)).collect::<Result<Vec<_>, InitError>>()?;
+    let points =
+        asked.points.iter().map(|path| points::inspect_file(path)).collect::<Result<Vec<_>, InitError>>()?;
     if !points.is_empty() && points.len() != opened.len() {
         let names: Vec<String> = opened.iter().map(|o| o.entry.name()).collect();
         let problem = format!(
@@ -76,7 +77,7 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
         );
         return Err(InitError::Init { problem });
     }
-    let mut channels = channels::look(&opened)?;
+    let mut channels = channels::scan_recordings(&opened)?;
     if !points.is_empty() {
         let seen = std::mem::take(&mut channels.bodies);
         let why = "--points says where the tip was, in the frame of another sensor";
@@ -89,7 +90,7 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
     let folders = paths.filter_map(|p| p.parent()).map(Path::to_owned).collect();
     let arm = arm::find(&asked.told, &channels, &folders, &asked.out.with_extension("urdf"))?;
     progress.step("reading the recordings");
-    let read = read::read(&arm, &channels, &opened)?;
+    let read = read::read_recordings(&arm, &channels, &opened)?;
     let pauses: usize = read.recordings.iter().map(|r| r.dwells.len()).sum();
     if pauses < FEWEST_PAUSES {
         let problem = format!(
@@ -102,7 +103,7 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
     progress.step("comparing motions");
     let board = asked.board.as_deref().map(read_board).transpose()?;
     let evidence = evidence::gather(&arm, &read);
-    let (cast, seats) = roles::cast(&arm, &evidence, board.as_ref());
+    let (cast, seats) = roles::assign_roles(&arm, &evidence, board.as_ref());
     let tracked = !points.is_empty()
         || cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
     // Where no sensor sees the tip, its pauses show on which link it is, and without a board where it sat.
@@ -135,7 +136,7 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
     // The trial opens them again.
     drop((read, opened));
     progress.step("trying the proposal");
-    proposal.tried = Some(tried(&proposal));
+    proposal.tried = Some(try_proposal(&proposal));
     Ok(proposal)
 }
 
@@ -207,7 +208,7 @@ pub struct Tried {
 }
 
 /// Calibrates with a proposal whose files may not be written yet: they are put beside a copy of it.
-fn tried(proposal: &Proposal) -> Result<Tried, String> {
+fn try_proposal(proposal: &Proposal) -> Result<Tried, String> {
     let attempt = || -> Result<Tried, InitError> {
         let folder =
             tempfile::tempdir().map_err(|source| InitError::Folder { path: std::env::temp_dir(), source })?;

@@ -42,9 +42,9 @@ pub struct Likeness {
 }
 
 /// Compares the speeds of the arm with those of a body; none where they were not seen moving together.
-pub fn likeness(arm: &Speeds, body: &Speeds) -> Option<Likeness> {
+pub fn compare_speeds(arm: &Speeds, body: &Speeds) -> Option<Likeness> {
     let at = |delay: i64| {
-        let correlation = pearson(common(&arm.0, &body.0, delay))?;
+        let correlation = pearson(common_bins(&arm.0, &body.0, delay))?;
         Some(Likeness { correlation, delay_s: delay as f64 * BIN_NS as f64 * 1e-9 })
     };
     // Of equals the shortest delay.
@@ -60,7 +60,11 @@ pub fn likeness(arm: &Speeds, body: &Speeds) -> Option<Likeness> {
 }
 
 /// Speeds in the bins that both have, the second late by so many.
-fn common<'a>(a: &'a [(i64, f64)], b: &'a [(i64, f64)], delay: i64) -> impl Iterator<Item = (f64, f64)> + 'a {
+fn common_bins<'a>(
+    a: &'a [(i64, f64)],
+    b: &'a [(i64, f64)],
+    delay: i64,
+) -> impl Iterator<Item = (f64, f64)> + 'a {
     let mut next = 0;
     a.iter().filter_map(move |(bin, speed)| {
         while b.get(next).is_some_and(|(other, _)| *other < bin + delay) {
@@ -99,17 +103,17 @@ mod tests {
         let arm = Speeds::of(&times, |i| path(times[i] as f64 * 1e-9));
         for delay_s in [0.0, 0.6, -1.3, 41.7] {
             let body = Speeds::of(&times, |i| path(times[i] as f64 * 1e-9 - delay_s));
-            let found = likeness(&arm, &body).unwrap();
+            let found = compare_speeds(&arm, &body).unwrap();
             assert!(
                 found.correlation > 0.99 && (found.delay_s - delay_s).abs() < 0.05,
                 "{delay_s}: {found:?}"
             );
         }
         let other = Speeds::of(&times, |i| path(7.0 + 1.37 * times[i] as f64 * 1e-9));
-        assert!(likeness(&arm, &other).unwrap().correlation < 0.6);
+        assert!(compare_speeds(&arm, &other).unwrap().correlation < 0.6);
         // What stands still correlates with nothing, and two seconds are too little.
-        assert!(likeness(&arm, &Speeds::of(&times, |_| Vector3::zeros())).is_none());
+        assert!(compare_speeds(&arm, &Speeds::of(&times, |_| Vector3::zeros())).is_none());
         let short = Speeds::of(&times[..200], |i| path(times[i] as f64 * 1e-9));
-        assert!(likeness(&arm, &short).is_none());
+        assert!(compare_speeds(&arm, &short).is_none());
     }
 }

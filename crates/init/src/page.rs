@@ -1,6 +1,6 @@
 //! A TOML file for people: every line with its reason.
 
-use armcal_core::printable;
+use armcal_core::printable_name;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub struct Page(String);
 impl Page {
     /// A comment of its own.
     pub fn note(&mut self, text: &str) {
-        let _ = writeln!(self.0, "# {}", printable(text));
+        let _ = writeln!(self.0, "# {}", printable_name(text));
     }
 
     /// A table's heading, after an empty line.
@@ -24,7 +24,7 @@ impl Page {
 
     /// A line and its reason.
     pub fn line(&mut self, toml: &str, why: &str) {
-        let why = printable(why);
+        let why = printable_name(why);
         let _ = match why.is_empty() {
             true => writeln!(self.0, "{toml}"),
             false => writeln!(self.0, "{toml:<width$}# {why}", width = COLUMN.max(toml.chars().count() + 1)),
@@ -38,30 +38,30 @@ impl Page {
 }
 
 /// A TOML string.
-pub fn quoted(text: &str) -> String {
+pub fn toml_string(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
 /// A TOML list of strings.
-pub fn list<S: AsRef<str>>(texts: &[S]) -> String {
-    let all: Vec<String> = texts.iter().map(|t| quoted(t.as_ref())).collect();
+pub fn toml_list<S: AsRef<str>>(texts: &[S]) -> String {
+    let all: Vec<String> = texts.iter().map(|t| toml_string(t.as_ref())).collect();
     format!("[{}]", all.join(", "))
 }
 
 /// A path as a pipeline in `folder` names it.
-pub fn relative(path: &Path, folder: &Path) -> String {
+pub fn toml_path(path: &Path, folder: &Path) -> String {
     let given = path.to_string_lossy();
     if armcal_recording::is_url(path) {
-        return quoted(&given);
+        return toml_string(&given);
     }
     let absolute = |p: &Path| std::path::absolute(p).ok();
     let found =
         absolute(path).zip(absolute(folder)).and_then(|(path, folder)| pathdiff::diff_paths(path, folder));
-    quoted(&found.unwrap_or_else(|| path.to_owned()).to_string_lossy())
+    toml_string(&found.unwrap_or_else(|| path.to_owned()).to_string_lossy())
 }
 
 /// A number with so many decimals, none of them idle zeros.
-pub fn number(value: f64, decimals: usize) -> String {
+pub fn toml_float(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let text = text.trim_end_matches('0');
     let text = if text.ends_with('.') { format!("{text}0") } else { text.to_owned() };
@@ -78,8 +78,8 @@ mod tests {
         let evil = "a\"b\\c\nnames = [1]\u{1b}";
         page.note(evil);
         page.section("[t]");
-        page.line(&format!("topic = {}", quoted(evil)), evil);
-        page.line(&format!("names = {}", list(&[evil, "x"])), "");
+        page.line(&format!("topic = {}", toml_string(evil)), evil);
+        page.line(&format!("names = {}", toml_list(&[evil, "x"])), "");
         let text = page.text();
         let table: toml::Table = text.parse().unwrap_or_else(|e| panic!("{e}\n{text}"));
         assert_eq!(table["t"]["topic"].as_str(), Some(evil));
@@ -89,7 +89,8 @@ mod tests {
 
     #[test]
     fn numbers_are_toml_floats() {
-        let shown = [(11.7, 1), (0.0, 3), (-0.0001, 2), (49.948_4, 2), (1.0, 1)].map(|(v, d)| number(v, d));
+        let shown =
+            [(11.7, 1), (0.0, 3), (-0.0001, 2), (49.948_4, 2), (1.0, 1)].map(|(v, d)| toml_float(v, d));
         assert_eq!(shown, ["11.7", "0.0", "0.0", "49.95", "1.0"]);
     }
 }

@@ -25,11 +25,11 @@ pub struct Points {
 }
 
 /// Looks into a file.
-pub fn look(path: &Path) -> Result<Points, InitError> {
+pub fn inspect_file(path: &Path) -> Result<Points, InitError> {
     let text = read_text("CSV of points", Kind::Data, path)?;
     let bad = |problem: String| InitError::Init { problem: format!("{}: {problem}", path.display()) };
     let table = parse(&text, 1.0, None).map_err(bad)?;
-    let unit = unit(&table.header).map_err(bad)?;
+    let unit = header_unit(&table.header).map_err(bad)?;
     let (mut time, mut unread) = (None, Vec::new());
     for name in &table.header {
         let called = name.to_lowercase();
@@ -46,7 +46,7 @@ pub fn look(path: &Path) -> Result<Points, InitError> {
 }
 
 /// The unit that the names of the coordinates carry; none where they carry none, or there are no names.
-fn unit(header: &[String]) -> Result<Option<LengthUnit>, String> {
+fn header_unit(header: &[String]) -> Result<Option<LengthUnit>, String> {
     let mut units = Vec::new();
     for axis in ["x", "y", "z"] {
         let Some(name) = header.iter().find(|name| is_axis(name, axis)) else { continue };
@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_unit_is_what_the_names_of_all_three_coordinates_say() {
-        let unit = |text: &str| unit(&text.split(',').map(str::to_owned).collect::<Vec<_>>());
+        let unit = |text: &str| header_unit(&text.split(',').map(str::to_owned).collect::<Vec<_>>());
         for text in ["Name,X [mm],Y [mm],Z [mm]", "z_mm,y_mm,x_mm", "X(mm),Y(mm),Z(mm)", "\"X/mm\",Y/mm,Z/mm"]
         {
             assert_eq!(unit(text).unwrap(), Some(LengthUnit::Mm), "{text}");

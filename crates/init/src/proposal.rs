@@ -5,7 +5,7 @@ use super::channels::BodyTopic;
 use super::draft::Draft;
 use super::evidence::Evidence;
 use super::files::Opened;
-use super::page::{Page, quoted};
+use super::page::{Page, toml_string};
 use super::points::Points;
 use super::read::AllRead;
 use super::roles::{Cast, Role};
@@ -14,7 +14,7 @@ use super::sockets::Sockets;
 use super::{Asked, Tried};
 use crate::error::InitError;
 use armcal_config::Pipeline;
-use armcal_recording::{atomic, sealed};
+use armcal_recording::{atomic, seal_text};
 use armcal_table::Board;
 use std::path::{Path, PathBuf};
 
@@ -108,8 +108,8 @@ impl Known<'_> {
             all.iter().for_each(|said| head.note(&format!("{what}: {said}")));
         }
         let name = self.asked.out.file_stem().unwrap_or_default().to_string_lossy();
-        head.line(&format!("name = {}", quoted(&name)), "");
-        let text = sealed(&(head.text() + &page.text())).into_owned();
+        head.line(&format!("name = {}", toml_string(&name)), "");
+        let text = seal_text(&(head.text() + &page.text())).into_owned();
         let pipeline = Pipeline::proposed(&self.asked.out, text, &folder)?;
         left.extend(self.read.left.clone());
         let bodies = self.read.bodies.iter().cloned().zip(self.cast.iter().cloned()).collect();

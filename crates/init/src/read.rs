@@ -19,7 +19,7 @@ const MOST_BODIES: usize = 24;
 pub struct Read {
     /// Its name.
     pub name: String,
-    /// The columns; bodies by their [`key`].
+    /// The columns; bodies by their [`body_key`].
     pub samples: Samples,
     /// Rates, clocks and losses.
     pub reports: Vec<StreamReport>,
@@ -30,7 +30,7 @@ pub struct Read {
 impl Read {
     /// What was seen of a body.
     pub fn body(&self, body: usize) -> Option<&PoseSamples> {
-        self.samples.bodies.get(&key(body)).filter(|seen| !seen.is_empty())
+        self.samples.bodies.get(&body_key(body)).filter(|seen| !seen.is_empty())
     }
 
     /// What was said about the reading of a stream.
@@ -43,7 +43,7 @@ impl Read {
 pub struct AllRead {
     /// All that was read: joints, bodies, thermometer.
     pub streams: Streams,
-    /// The bodies, by the number in their [`key`].
+    /// The bodies, by the number in their [`body_key`].
     pub bodies: Vec<BodyTopic>,
     /// The recordings, in their order.
     pub recordings: Vec<Read>,
@@ -52,12 +52,12 @@ pub struct AllRead {
 }
 
 /// The name of a body while nobody knows its role.
-pub fn key(body: usize) -> String {
+pub fn body_key(body: usize) -> String {
     format!("b{body:03}")
 }
 
 /// Reads all that may be used.
-pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead, InitError> {
+pub fn read_recordings(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead, InitError> {
     let mut left = Vec::new();
     let mut bodies: Vec<BodyTopic> = Vec::new();
     for body in &channels.bodies {
@@ -80,7 +80,7 @@ pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead
             bodies.push(body.clone());
         }
     }
-    frames::join(&mut bodies, opened, &mut left)?;
+    frames::assign_root_frames(&mut bodies, opened, &mut left)?;
     let pose = |b: &BodyTopic| {
         let BodyTopic { topic, body, frame, position, orientation } = b.clone();
         PoseStream { topic, body, frame, position, orientation, ..PoseStream::default() }
@@ -95,7 +95,7 @@ pub fn read(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead
             name: field.and_then(|f| f.name.clone()),
             ..JointStream::default()
         }],
-        bodies: bodies.iter().enumerate().map(|(at, body)| (key(at), pose(body))).collect(),
+        bodies: bodies.iter().enumerate().map(|(at, body)| (body_key(at), pose(body))).collect(),
         temperature: channels.temperatures.first().map(thermometer),
         ..Streams::default()
     };
@@ -127,15 +127,18 @@ fn read_one(
                     found.map_err(|source| RunError::Dwell { recording: name.clone(), source })?;
                 return Ok(Read { name, samples, reports, dwells });
             }
-            Err(source) => {
-                mend(streams, &source, left).ok_or(RunError::Recording { recording: name.clone(), source })?
-            }
+            Err(source) => correct_streams(streams, &source, left)
+                .ok_or(RunError::Recording { recording: name.clone(), source })?,
         }
     }
 }
 
 /// Reads on after an error that says which other unit it must be, or which body cannot be read.
-fn mend(streams: &mut Streams, error: &RecordingError, left: &mut Vec<(String, String)>) -> Option<()> {
+fn correct_streams(
+    streams: &mut Streams,
+    error: &RecordingError,
+    left: &mut Vec<(String, String)>,
+) -> Option<()> {
     let joints = &mut streams.joints[0];
     match error {
         RecordingError::WrongUnit { role: "joints", why, .. }

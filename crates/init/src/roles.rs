@@ -2,7 +2,7 @@
 
 use super::arm::Arm;
 use super::evidence::{Evidence, STANDS_M};
-use super::seats::{Seats, seats};
+use super::seats::{Seats, find_seats};
 use armcal_core::Pose;
 use armcal_core::robust::median;
 use armcal_table::Board;
@@ -78,12 +78,12 @@ pub struct Cast {
 }
 
 /// Every body with its role, and what the board says where there is one.
-pub fn cast(arm: &Arm, evidence: &[Evidence], board: Option<&Board>) -> (Vec<Cast>, Option<Seats>) {
+pub fn assign_roles(arm: &Arm, evidence: &[Evidence], board: Option<&Board>) -> (Vec<Cast>, Option<Seats>) {
     let mut all: Vec<Cast> = evidence.iter().map(|e| first_look(arm, e)).collect();
     let last = arm.carried.len() - 1;
     let at_end: Vec<usize> = (0..all.len()).filter(|b| all[*b].role == Role::Marker(last)).collect();
     let still: Vec<usize> = (0..all.len()).filter(|b| all[*b].role == Role::Still).collect();
-    let seats = board.and_then(|board| seats(board, evidence, &at_end, &still));
+    let seats = board.and_then(|board| find_seats(board, evidence, &at_end, &still));
     if let Some(tip) = the_tip(arm, evidence, &at_end, seats.as_ref(), &mut all) {
         the_base(evidence, tip, &still, seats.as_ref(), &mut all);
     }

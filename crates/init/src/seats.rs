@@ -34,7 +34,7 @@ pub struct Seats {
 }
 
 /// The bodies on the last link and those that stand still whose poses put most pauses into cavities.
-pub fn seats(board: &Board, evidence: &[Evidence], tips: &[usize], still: &[usize]) -> Option<Seats> {
+pub fn find_seats(board: &Board, evidence: &[Evidence], tips: &[usize], still: &[usize]) -> Option<Seats> {
     let counted = |tip: usize, table: usize| -> Vec<Count> {
         let both = evidence[tip].recordings.iter().zip(&evidence[table].recordings);
         both.map(|pair| match pair {
@@ -120,7 +120,7 @@ fn is_seated(board: &Board, board_from_world: &Pose, at_m: &Vector3<f64>) -> boo
 
 /// The tilt of the table in each recording, against the recording in which its normal is steepest; none without a mechanism, or
 /// where it did not move.
-pub fn tilts(board: &Board, table: &Evidence) -> Vec<Option<Tilt>> {
+pub fn table_tilts(board: &Board, table: &Evidence) -> Vec<Option<Tilt>> {
     let means: Vec<Option<Pose>> = table.recordings.iter().map(|r| r.as_ref()?.mean).collect();
     let steep = |pose: &&Pose| (pose.rotation * Vector3::z()).z;
     let level = means.iter().flatten().max_by(|a, b| steep(a).total_cmp(&steep(b)));
@@ -139,7 +139,7 @@ pub fn tilts(board: &Board, table: &Evidence) -> Vec<Option<Tilt>> {
 }
 
 /// How well a constant turn of the base explains that it is not where the world's z axis points [rad].
-pub fn lean(bases: &[UnitQuaternion<f64>]) -> f64 {
+pub fn median_tilt_rad(bases: &[UnitQuaternion<f64>]) -> f64 {
     let lean: Vec<f64> = bases.iter().map(|q| (q * Vector3::z()).angle(&Vector3::z())).collect();
     median(&lean)
 }

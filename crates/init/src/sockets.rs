@@ -9,7 +9,7 @@ use crate::error::InitError;
 use armcal_core::Pose;
 use armcal_core::robust::median;
 use armcal_stages::Inputs;
-use armcal_stages::links::rigid;
+use armcal_stages::links::fit_rigid_motion;
 use armcal_table::{Board, Cavity};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
@@ -67,7 +67,8 @@ pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, InitError> {
         let place = Point3::from(place.translation.vector);
         let points = |firsts: &Vec<Pose>| firsts.iter().map(|first| (first * place).coords).collect();
         let tips_m: Vec<Points> = firsts.iter().map(points).collect();
-        let Some(heaps) = in_all(&tips_m.iter().map(|tips_m| heaps(tips_m)).collect::<Vec<_>>()) else {
+        let Some(heaps) = in_all(&tips_m.iter().map(|tips_m| cluster_points(tips_m)).collect::<Vec<_>>())
+        else {
             continue;
         };
         let turned = heaps.iter().zip(&read.recordings).all(|(heaps, r)| {
@@ -97,22 +98,22 @@ pub fn find(arm: &Arm, read: &AllRead) -> Result<Option<Sockets>, InitError> {
         return Ok(None);
     };
     let visits = (0..heaps[0].len()).map(|s| heaps.iter().map(|heaps| heaps[s].len()).sum()).collect();
-    Ok(layout(&tips_m, &heaps).map(|in_board_m| Sockets {
+    Ok(socket_layout(&tips_m, &heaps).map(|in_board_m| Sockets {
         tip_link,
-        board: board(in_board_m),
+        board: socket_board(in_board_m),
         visits,
         scatter_m,
         next_scatter_m,
     }))
 }
 
-fn middle(tips_m: &[Vector3<f64>], heap: &[usize]) -> Vector3<f64> {
+fn median_point(tips_m: &[Vector3<f64>], heap: &[usize]) -> Vector3<f64> {
     let axis = |k: usize| median(&heap.iter().map(|i| tips_m[*i][k]).collect::<Vec<_>>());
     Vector3::new(axis(0), axis(1), axis(2))
 }
 
 fn off_m(tips_m: &[Vector3<f64>], heap: &[usize]) -> Vec<f64> {
-    let middle = middle(tips_m, heap);
+    let middle = median_point(tips_m, heap);
     heap.iter().map(|i| (tips_m[*i] - middle).norm()).collect()
 }
 
@@ -128,13 +129,13 @@ fn in_all(recordings: &[BTreeMap<usize, (f64, Heaps)>]) -> Option<Vec<Heaps>> {
 
 /// Heaps of points, by their number: what the longest edges of their spanning tree part, and how many times longer these are
 /// than those that are left.
-fn heaps(points_m: &[Vector3<f64>]) -> BTreeMap<usize, (f64, Heaps)> {
+fn cluster_points(points_m: &[Vector3<f64>]) -> BTreeMap<usize, (f64, Heaps)> {
     let edges = spanning_tree(points_m);
     let mut found: BTreeMap<usize, (f64, Heaps)> = BTreeMap::new();
     // Beside the edges between heaps there may be some to pauses elsewhere.
     for cut in 1..(2 * MOST).min(edges.len()) {
         let fall = edges[cut - 1].2 / edges[cut].2.max(1e-6);
-        let heaps = parted(points_m.len(), &edges[cut..]);
+        let heaps = connected_components(points_m.len(), &edges[cut..]);
         let inside: usize = heaps.iter().map(Vec::len).sum();
         let enough = inside as f64 >= SHARE * points_m.len() as f64;
         if enough && found.get(&heaps.len()).is_none_or(|(best, _)| fall > *best) {
@@ -145,7 +146,7 @@ fn heaps(points_m: &[Vector3<f64>]) -> BTreeMap<usize, (f64, Heaps)> {
 }
 
 /// The points that these edges join, in the order of their first.
-fn parted(points: usize, edges: &[(usize, usize, f64)]) -> Heaps {
+fn connected_components(points: usize, edges: &[(usize, usize, f64)]) -> Heaps {
     let mut group: Vec<usize> = (0..points).collect();
     for (a, b, _) in edges {
         let [from, to] = [group[*a], group[*b]];
@@ -188,11 +189,11 @@ fn spanning_tree(points_m: &[Vector3<f64>]) -> Vec<(usize, usize, f64)> {
 
 /// Where the sockets are on their fixture: the mean over the recordings, each laid onto the first; the first socket at the
 /// origin, the second on the x axis.
-fn layout(tips_m: &[Vec<Vector3<f64>>], heaps: &[Heaps]) -> Option<Vec<Vector3<f64>>> {
+fn socket_layout(tips_m: &[Vec<Vector3<f64>>], heaps: &[Heaps]) -> Option<Vec<Vector3<f64>>> {
     let middles: Vec<Vec<Vector3<f64>>> = tips_m
         .iter()
         .zip(heaps)
-        .map(|(tips_m, heaps)| heaps.iter().map(|heap| middle(tips_m, heap)).collect())
+        .map(|(tips_m, heaps)| heaps.iter().map(|heap| median_point(tips_m, heap)).collect())
         .collect();
     let count = middles[0].len();
     let [a, b] = [0, 1.min(count - 1)];
@@ -203,7 +204,7 @@ fn layout(tips_m: &[Vec<Vector3<f64>>], heaps: &[Heaps]) -> Option<Vec<Vector3<f
     }
     let mut mean = vec![Vector3::zeros(); count];
     for own in &middles {
-        let onto = rigid(own, &middles[0])?;
+        let onto = fit_rigid_motion(own, &middles[0])?;
         mean.iter_mut()
             .zip(own)
             .for_each(|(sum, p)| *sum += onto.transform_point(&(*p).into()).coords / middles.len() as f64);
@@ -220,7 +221,7 @@ fn layout(tips_m: &[Vec<Vector3<f64>>], heaps: &[Heaps]) -> Option<Vec<Vector3<f
     Some(mean.iter().map(|p| p - mean[0]).map(|p| Vector3::new(p.dot(&x), p.dot(&y), p.dot(&z))).collect())
 }
 
-fn board(in_board_m: Vec<Vector3<f64>>) -> Board {
+fn socket_board(in_board_m: Vec<Vector3<f64>>) -> Board {
     let cavity =
         |(at, in_board_m): (usize, Vector3<f64>)| Cavity { name: format!("socket_{}", at + 1), in_board_m };
     Board {
@@ -282,10 +283,10 @@ mod tests {
         points.extend(heap([0.55, 0.0, 0.1], 0.006, 9, 1.0));
         points.extend(heap([0.5, 0.06, 0.1], 0.006, 10, 2.0));
         points.push(Vector3::new(0.1, 0.4, 0.6));
-        let found = in_all(&[heaps(&points)]).expect("three heaps").remove(0);
+        let found = in_all(&[cluster_points(&points)]).expect("three heaps").remove(0);
         assert_eq!(found.iter().map(Vec::len).collect::<Vec<_>>(), [12, 9, 10]);
         assert_eq!(found[1], (12..21).collect::<Vec<_>>());
-        assert!(in_all(&[heaps(&heap([0.0; 3], 0.3, 40, 0.0))]).is_none());
+        assert!(in_all(&[cluster_points(&heap([0.0; 3], 0.3, 40, 0.0))]).is_none());
     }
 
     #[test]
@@ -297,7 +298,7 @@ mod tests {
             .map(|m| fixture.iter().map(|p| m.transform_point(&(*p).into()).coords).collect())
             .collect();
         let heaps: Vec<Heaps> = vec![(0..3).map(|k| vec![k]).collect(); 2];
-        let found = layout(&tips, &heaps).expect("a layout");
+        let found = socket_layout(&tips, &heaps).expect("a layout");
         for (found, planted) in found.iter().zip(&fixture) {
             assert!((found - planted).norm() < 1e-9, "{found:?}");
         }

@@ -12,8 +12,8 @@ use nalgebra::Vector3;
 ///
 /// Fails without a cycle, or where one has fewer than two samples.
 pub fn round_off_m(corner: &Corner, runs: &[Vec<Vector3<f64>>]) -> Result<f64, IsoError> {
-    check("cornering round-off error", runs)?;
-    Ok(mean(&runs.iter().map(|run| closest(&corner.position_m, run).1).collect::<Vec<_>>()))
+    check_cycles("cornering round-off error", runs)?;
+    Ok(mean(&runs.iter().map(|run| closest_piece(&corner.position_m, run).1).collect::<Vec<_>>()))
 }
 
 /// Cornering overshoot CO [m]: the largest distance from the second leg after the corner, on the side towards which
@@ -22,14 +22,14 @@ pub fn round_off_m(corner: &Corner, runs: &[Vec<Vector3<f64>>]) -> Result<f64, I
 ///
 /// Fails without a cycle, or where one has fewer than two samples.
 pub fn overshoot_m(corner: &Corner, runs: &[Vec<Vector3<f64>>]) -> Result<f64, IsoError> {
-    check("cornering overshoot", runs)?;
+    check_cycles("cornering overshoot", runs)?;
     Ok(mean(&runs.iter().map(|run| run_overshoot_m(corner, run)).collect::<Vec<_>>()))
 }
 
 fn run_overshoot_m(corner: &Corner, run: &[Vector3<f64>]) -> f64 {
     let leaving = corner.leaving.into_inner();
     let outward = corner.arriving.into_inner() - leaving * corner.arriving.dot(&leaving);
-    let after = &run[closest(&corner.position_m, run).0..];
+    let after = &run[closest_piece(&corner.position_m, run).0..];
     let on_leg =
         after.iter().map(|p| p - corner.position_m).take_while(|p| p.dot(&leaving) <= corner.straight_m);
     let outside = on_leg.filter(|p| p.dot(&outward) > 0.0);
@@ -38,7 +38,7 @@ fn run_overshoot_m(corner: &Corner, run: &[Vector3<f64>]) -> f64 {
 
 /// Index of the sample that ends the piece of a polyline closest to a point, and its distance [m]; the first of
 /// equals.
-fn closest(point_m: &Vector3<f64>, run: &[Vector3<f64>]) -> (usize, f64) {
+fn closest_piece(point_m: &Vector3<f64>, run: &[Vector3<f64>]) -> (usize, f64) {
     let pieces = run.windows(2).enumerate().map(|(k, ends)| (k + 1, distance_m(point_m, &ends[0], &ends[1])));
     pieces.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN))
 }
@@ -51,7 +51,7 @@ fn distance_m(point_m: &Vector3<f64>, from_m: &Vector3<f64>, to_m: &Vector3<f64>
     (reach_m - step_m * s).norm()
 }
 
-fn check(what: &'static str, runs: &[Vec<Vector3<f64>>]) -> Result<(), IsoError> {
+fn check_cycles(what: &'static str, runs: &[Vec<Vector3<f64>>]) -> Result<(), IsoError> {
     at_least(1, "cycles", runs.len(), what)?;
     for run in runs {
         at_least(2, "samples in each cycle", run.len(), what)?;

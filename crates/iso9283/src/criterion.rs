@@ -3,7 +3,7 @@
 use crate::IsoError;
 use crate::catalogue::{CHARACTERISTICS, Characteristic, Component, Quantity};
 use crate::pose::Deviation;
-use armcal_core::listed;
+use armcal_core::list_names;
 use serde::{Serialize, Serializer};
 
 /// One criterion at one place.
@@ -236,7 +236,8 @@ impl Findings {
         if reasons.is_empty() {
             return format!("{}; there are none here", what.needs);
         }
-        let said: Vec<String> = reasons.iter().map(|(why, at)| format!("{why} ({})", listed(at))).collect();
-        listed(&said)
+        let said: Vec<String> =
+            reasons.iter().map(|(why, at)| format!("{why} ({})", list_names(at))).collect();
+        list_names(&said)
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::IsoError;
 use crate::pose::three_deviations;
-use crate::stats::{deviation, mean};
-use crate::tip_pose::{TipPose, check};
+use crate::stats::{mean, standard_deviation};
+use crate::tip_pose::{TipPose, check_poses};
 use nalgebra::Vector3;
 
 /// A distance between two poses, or what the standard makes of several.
@@ -17,7 +17,7 @@ pub struct Distance {
     pub angles_rad: Option<Vector3<f64>>,
 }
 
-fn between(pair: &[TipPose; 2]) -> Distance {
+fn distance_between(pair: &[TipPose; 2]) -> Distance {
     let step_m = pair[1].position_m - pair[0].position_m;
     Distance {
         position_m: step_m.norm(),
@@ -27,7 +27,8 @@ fn between(pair: &[TipPose; 2]) -> Distance {
 }
 
 fn check_pairs(what: &'static str, pairs: &[[TipPose; 2]], least: usize) -> Result<(), IsoError> {
-    (0..2).try_for_each(|end| check(what, &pairs.iter().map(|pair| pair[end]).collect::<Vec<_>>(), least))
+    (0..2)
+        .try_for_each(|end| check_poses(what, &pairs.iter().map(|pair| pair[end]).collect::<Vec<_>>(), least))
 }
 
 /// Distance accuracy: mean attained minus commanded distance, `AD_P = D_mean - D_c`, signed; likewise along and
@@ -38,7 +39,7 @@ pub fn distance_accuracy(commanded: &[TipPose; 2], attained: &[[TipPose; 2]]) ->
     check_pairs("distance accuracy", attained, 1)?;
     check_pairs("distance accuracy", std::slice::from_ref(commanded), 1)?;
     let (asked, got): (Distance, Vec<Distance>) =
-        (between(commanded), attained.iter().map(between).collect());
+        (distance_between(commanded), attained.iter().map(distance_between).collect());
     let n = got.len() as f64;
     let angles_rad = got.iter().map(|d| d.angles_rad).collect::<Option<Vec<_>>>();
     Ok(Distance {
@@ -56,10 +57,10 @@ pub fn distance_accuracy(commanded: &[TipPose; 2], attained: &[[TipPose; 2]]) ->
 /// Fails with fewer than two cycles, or where a pose is not finite.
 pub fn distance_repeatability(attained: &[[TipPose; 2]]) -> Result<Distance, IsoError> {
     check_pairs("distance repeatability", attained, 2)?;
-    let got: Vec<Distance> = attained.iter().map(between).collect();
+    let got: Vec<Distance> = attained.iter().map(distance_between).collect();
     let angles_rad = got.iter().map(|d| d.angles_rad).collect::<Option<Vec<_>>>();
     Ok(Distance {
-        position_m: 3.0 * deviation(&got.iter().map(|d| d.position_m).collect::<Vec<_>>()),
+        position_m: 3.0 * standard_deviation(&got.iter().map(|d| d.position_m).collect::<Vec<_>>()),
         axes_m: three_deviations(&got.iter().map(|d| d.axes_m).collect::<Vec<_>>()),
         angles_rad: angles_rad.map(|turns| three_deviations(&turns)),
     })

@@ -21,7 +21,7 @@ pub fn path_accuracy(commanded: &[TipPose], attained: &[Vec<TipPose>]) -> Result
         });
     }
     let planes = commanded.iter().zip(attained).map(|(command, poses)| pose_accuracy(command, poses));
-    over("path accuracy", planes.map(|ap| Ok(ap?.deviation())).collect::<Result<_, _>>()?)
+    largest_over_planes("path accuracy", planes.map(|ap| Ok(ap?.deviation())).collect::<Result<_, _>>()?)
 }
 
 /// Path repeatability: `RT_P = max_i (l_mean_i + 3 S_li)` and `RT_a = max_i 3 S_ai` (ISO 9283:1998, 8.3).
@@ -29,11 +29,11 @@ pub fn path_accuracy(commanded: &[TipPose], attained: &[Vec<TipPose>]) -> Result
 /// Fails without a plane, with a plane of fewer than two cycles, or where a pose is not finite.
 pub fn path_repeatability(attained: &[Vec<TipPose>]) -> Result<Deviation, IsoError> {
     let planes = attained.iter().map(|poses| Ok(pose_repeatability(poses)?.deviation()));
-    over("path repeatability", planes.collect::<Result<_, _>>()?)
+    largest_over_planes("path repeatability", planes.collect::<Result<_, _>>()?)
 }
 
 /// The largest over all planes.
-fn over(what: &'static str, planes: Vec<Deviation>) -> Result<Deviation, IsoError> {
+fn largest_over_planes(what: &'static str, planes: Vec<Deviation>) -> Result<Deviation, IsoError> {
     at_least(1, "measuring planes", planes.len(), what)?;
     Ok(Deviation::largest(&planes))
 }

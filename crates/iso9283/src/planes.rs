@@ -29,13 +29,13 @@ struct Candidate {
 
 /// The crossing of every plane by `run`, or none. A crossing further than `reach_m` [m] from the commanded pose
 /// does not belong to the path.
-pub fn cross(planes: &[Plane], run: &[TimedPose], reach_m: f64) -> Vec<Option<Crossing>> {
+pub fn find_crossings(planes: &[Plane], run: &[TimedPose], reach_m: f64) -> Vec<Option<Crossing>> {
     let mut candidates: Vec<Candidate> = Vec::new();
     // Chains so far that no earlier one undercuts, in order of time: costs fall from each to the next.
     let mut cheapest: Vec<usize> = Vec::new();
     for (index, plane) in planes.iter().enumerate() {
         let earlier = candidates.len();
-        for (at, crossing) in crossings(plane, run) {
+        for (at, crossing) in crossings_of_plane(plane, run) {
             let distance_m = (crossing.pose.position_m - plane.pose.position_m).norm();
             if distance_m <= reach_m {
                 let ended = cheapest.partition_point(|&chain| candidates[chain].at < at);
@@ -70,7 +70,7 @@ fn keep_cheapest(candidates: &[Candidate], chains: &mut Vec<usize>) {
 }
 
 /// All crossings of a plane from behind to before it.
-fn crossings(plane: &Plane, run: &[TimedPose]) -> Vec<((usize, f64), Crossing)> {
+fn crossings_of_plane(plane: &Plane, run: &[TimedPose]) -> Vec<((usize, f64), Crossing)> {
     let beyond_m: Vec<f64> =
         run.iter().map(|s| plane.normal.dot(&(s.pose.position_m - plane.pose.position_m))).collect();
     let upward = (1..run.len()).filter(|&k| beyond_m[k - 1] < 0.0 && beyond_m[k] >= 0.0);

@@ -2,8 +2,8 @@
 
 use crate::IsoError;
 use crate::error::at_least;
-use crate::stats::{deviation, largest, mean};
-use crate::tip_pose::{TipPose, barycentre, check};
+use crate::stats::{largest, mean, standard_deviation};
+use crate::tip_pose::{TipPose, barycentre, check_poses};
 use nalgebra::Vector3;
 
 /// A deviation of the position, and about x, y, z where every orientation was tracked.
@@ -49,8 +49,8 @@ impl PoseAccuracy {
 ///
 /// Fails without a pose, or where one is not finite.
 pub fn pose_accuracy(commanded: &TipPose, attained: &[TipPose]) -> Result<PoseAccuracy, IsoError> {
-    check("pose accuracy", attained, 1)?;
-    check("pose accuracy", std::slice::from_ref(commanded), 1)?;
+    check_poses("pose accuracy", attained, 1)?;
+    check_poses("pose accuracy", std::slice::from_ref(commanded), 1)?;
     let centre = barycentre(attained);
     let axes_m = centre.position_m - commanded.position_m;
     Ok(PoseAccuracy { position_m: axes_m.norm(), axes_m, angles_rad: centre.turn_from_rad(commanded) })
@@ -80,10 +80,10 @@ impl PoseRepeatability {
 ///
 /// Fails with fewer than two poses, or where one is not finite.
 pub fn pose_repeatability(attained: &[TipPose]) -> Result<PoseRepeatability, IsoError> {
-    check("pose repeatability", attained, 2)?;
+    check_poses("pose repeatability", attained, 2)?;
     let centre = barycentre(attained);
     let distances_m: Vec<f64> = attained.iter().map(|p| (p.position_m - centre.position_m).norm()).collect();
-    let (mean_m, deviation_m) = (mean(&distances_m), deviation(&distances_m));
+    let (mean_m, deviation_m) = (mean(&distances_m), standard_deviation(&distances_m));
     let turns_rad: Option<Vec<Vector3<f64>>> = attained.iter().map(|p| p.turn_from_rad(&centre)).collect();
     Ok(PoseRepeatability {
         radius_m: mean_m + 3.0 * deviation_m,
@@ -95,7 +95,9 @@ pub fn pose_repeatability(attained: &[TipPose]) -> Result<PoseRepeatability, Iso
 
 /// Three standard deviations of each component.
 pub(crate) fn three_deviations(rows: &[Vector3<f64>]) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| 3.0 * deviation(&rows.iter().map(|row| row[axis]).collect::<Vec<_>>()))
+    Vector3::from_fn(|axis, _| {
+        3.0 * standard_deviation(&rows.iter().map(|row| row[axis]).collect::<Vec<_>>())
+    })
 }
 
 /// Multi-directional pose accuracy variation vAP, the largest distance and the largest angle between the barycentres of two
@@ -106,7 +108,7 @@ pub(crate) fn three_deviations(rows: &[Vector3<f64>]) -> Vector3<f64> {
 pub fn accuracy_variation(directions: &[Vec<TipPose>]) -> Result<Deviation, IsoError> {
     const WHAT: &str = "multi-directional pose accuracy variation";
     at_least(2, "directions of approach", directions.len(), WHAT)?;
-    directions.iter().try_for_each(|poses| check(WHAT, poses, 1))?;
+    directions.iter().try_for_each(|poses| check_poses(WHAT, poses, 1))?;
     let centres: Vec<TipPose> = directions.iter().map(|poses| barycentre(poses)).collect();
     let pairs = centres.iter().enumerate().flat_map(|(h, a)| centres[..h].iter().map(move |b| (a, b)));
     let between = |(a, b): (&TipPose, &TipPose)| Deviation {

@@ -29,7 +29,11 @@ impl Settling {
 /// straight line.
 ///
 /// Fails when the samples begin inside the band, end outside it, are not in order of time, or are not finite.
-pub fn settle(run: &[TimedPose], attained_m: &Vector3<f64>, limit_band_m: f64) -> Result<Settling, IsoError> {
+pub fn measure_settling(
+    run: &[TimedPose],
+    attained_m: &Vector3<f64>,
+    limit_band_m: f64,
+) -> Result<Settling, IsoError> {
     check_run("samples around the stop", run)?;
     if !(limit_band_m.is_finite() && limit_band_m > 0.0) {
         return Err(IsoError::NotPositive { what: "the limit band [m]".into(), value: limit_band_m });

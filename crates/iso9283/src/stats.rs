@@ -6,7 +6,7 @@ pub(crate) fn mean(values: &[f64]) -> f64 {
 }
 
 /// Standard deviation with n - 1 in the denominator; NaN for fewer than two.
-pub(crate) fn deviation(values: &[f64]) -> f64 {
+pub(crate) fn standard_deviation(values: &[f64]) -> f64 {
     let centre = mean(values);
     let squares: f64 = values.iter().map(|v| (v - centre).powi(2)).sum();
     (squares / (values.len() as f64 - 1.0)).sqrt()

@@ -86,7 +86,7 @@ fn mean_orientation(poses: &[TipPose]) -> Option<UnitQuaternion<f64>> {
 }
 
 /// Fails unless there are at least `least` poses for the criterion `what`, all finite.
-pub(crate) fn check(what: &'static str, poses: &[TipPose], least: usize) -> Result<(), IsoError> {
+pub(crate) fn check_poses(what: &'static str, poses: &[TipPose], least: usize) -> Result<(), IsoError> {
     at_least(least, "cycles", poses.len(), what)?;
     match poses.iter().position(|p| !p.is_finite()) {
         Some(index) => Err(IsoError::NotFinite { what: format!("poses of {what}"), index }),

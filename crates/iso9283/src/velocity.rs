@@ -5,7 +5,7 @@
 
 use crate::IsoError;
 use crate::error::at_least;
-use crate::stats::{deviation, largest, mean};
+use crate::stats::{largest, mean, standard_deviation};
 
 /// Path velocity accuracy `AV = (v_mean - v_c) / v_c` as a ratio, `v_mean` the mean over cycles of their mean speeds
 /// (ISO 9283:1998, 8.6).
@@ -13,7 +13,7 @@ use crate::stats::{deviation, largest, mean};
 /// Fails without a cycle, with a cycle without a speed, where one is not finite, or unless `commanded_m_s` is
 /// positive.
 pub fn velocity_accuracy(commanded_m_s: f64, runs: &[Vec<f64>]) -> Result<f64, IsoError> {
-    check("path velocity accuracy", commanded_m_s, runs, 1)?;
+    check_speeds("path velocity accuracy", commanded_m_s, runs, 1)?;
     Ok((mean(&means_m_s(runs)) - commanded_m_s) / commanded_m_s)
 }
 
@@ -22,15 +22,15 @@ pub fn velocity_accuracy(commanded_m_s: f64, runs: &[Vec<f64>]) -> Result<f64, I
 ///
 /// Fails like [`velocity_accuracy`], and with fewer than two cycles.
 pub fn velocity_repeatability(commanded_m_s: f64, runs: &[Vec<f64>]) -> Result<f64, IsoError> {
-    check("path velocity repeatability", commanded_m_s, runs, 2)?;
-    Ok(3.0 * deviation(&means_m_s(runs)) / commanded_m_s)
+    check_speeds("path velocity repeatability", commanded_m_s, runs, 2)?;
+    Ok(3.0 * standard_deviation(&means_m_s(runs)) / commanded_m_s)
 }
 
 /// Path velocity fluctuation `FV = max_j (max_i v_ij - min_i v_ij)` [m/s] (ISO 9283:1998, 8.6).
 ///
 /// Fails without a cycle, with a cycle without a speed, or where one is not finite.
 pub fn velocity_fluctuation_m_s(runs: &[Vec<f64>]) -> Result<f64, IsoError> {
-    check("path velocity fluctuation", 1.0, runs, 1)?;
+    check_speeds("path velocity fluctuation", 1.0, runs, 1)?;
     let span = |run: &Vec<f64>| {
         let ends = run.iter().fold((f64::MAX, f64::MIN), |(low, high), &v| (low.min(v), high.max(v)));
         ends.1 - ends.0
@@ -42,7 +42,12 @@ fn means_m_s(runs: &[Vec<f64>]) -> Vec<f64> {
     runs.iter().map(|run| mean(run)).collect()
 }
 
-fn check(what: &'static str, commanded_m_s: f64, runs: &[Vec<f64>], least: usize) -> Result<(), IsoError> {
+fn check_speeds(
+    what: &'static str,
+    commanded_m_s: f64,
+    runs: &[Vec<f64>],
+    least: usize,
+) -> Result<(), IsoError> {
     if !(commanded_m_s.is_finite() && commanded_m_s > 0.0) {
         return Err(IsoError::NotPositive { what: "the commanded speed [m/s]".into(), value: commanded_m_s });
     }

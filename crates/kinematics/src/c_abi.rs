@@ -86,12 +86,12 @@ thread_local! {
 }
 
 /// Text for C, without what would end it early.
-fn text(words: &str) -> CString {
+fn c_string(words: &str) -> CString {
     CString::new(words.replace('\0', "\\0")).unwrap_or_default()
 }
 
 /// Runs what a function does; what goes wrong becomes a code and a message.
-pub(crate) fn guarded(work: impl FnOnce() -> Result<(), KinematicsError>) -> Code {
+pub(crate) fn run_guarded(work: impl FnOnce() -> Result<(), KinematicsError>) -> Code {
     let (code, message) = match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => return Code::Ok,
         Ok(Err(error)) => {
@@ -109,16 +109,16 @@ pub(crate) fn guarded(work: impl FnOnce() -> Result<(), KinematicsError>) -> Cod
             (Code::Internal, "a mistake in armcal: please report the model.json and the call".to_owned())
         }
     };
-    ERROR.with_borrow_mut(|last| *last = text(&message));
+    ERROR.with_borrow_mut(|last| *last = c_string(&message));
     code
 }
 
 /// The same with the motion that it is about.
-fn with<H>(motion: Option<H>, work: impl FnOnce(H) -> Result<(), KinematicsError>) -> Code {
-    guarded(|| work(motion.ok_or_else(|| null("motion"))?))
+fn with_motion<H>(motion: Option<H>, work: impl FnOnce(H) -> Result<(), KinematicsError>) -> Code {
+    run_guarded(|| work(motion.ok_or_else(|| null_argument("motion"))?))
 }
 
-fn null(what: &'static str) -> KinematicsError {
+fn null_argument(what: &'static str) -> KinematicsError {
     KinematicsError::Argument { what, problem: "must not be NULL".into() }
 }
 
@@ -135,7 +135,7 @@ unsafe fn needed<'a>(
     what: &'static str,
 ) -> Result<&'a [f64], KinematicsError> {
     // SAFETY: as above.
-    unsafe { numbers(at, length) }.ok_or_else(|| null(what))
+    unsafe { numbers(at, length) }.ok_or_else(|| null_argument(what))
 }
 
 /// SAFETY: `at` is NULL or has room for as many numbers as there are.
@@ -149,7 +149,7 @@ unsafe fn put(at: *mut f64, numbers: impl ExactSizeIterator<Item = f64>) {
 /// SAFETY: `at` is NULL or has room for it.
 unsafe fn set<T>(at: *mut T, what: &'static str, value: T) -> Result<(), KinematicsError> {
     if at.is_null() {
-        return Err(null(what));
+        return Err(null_argument(what));
     }
     // SAFETY: as above; the caller's memory may not have been set to anything, so nothing in it is dropped.
     unsafe { at.write(value) };
@@ -157,7 +157,7 @@ unsafe fn set<T>(at: *mut T, what: &'static str, value: T) -> Result<(), Kinemat
 }
 
 /// A number that may be missing.
-fn known(number: f64) -> Option<f64> {
+fn unless_nan(number: f64) -> Option<f64> {
     (!number.is_nan()).then_some(number)
 }
 
@@ -167,8 +167,8 @@ impl From<&CConditions> for Conditions {
             tip: c.tip,
             in_base: c.in_base != 0,
             recording: usize::try_from(c.recording).ok(),
-            load_kg: known(c.load_kg),
-            temperature_c: known(c.temperature_c),
+            load_kg: unless_nan(c.load_kg),
+            temperature_c: unless_nan(c.temperature_c),
         }
     }
 }
@@ -190,7 +190,7 @@ impl MotionHandle {
         [nominal, corrected, direction]: [*mut f64; 3],
         reached: *mut CReached,
     ) {
-        self.warnings = text(&point.warnings.join("\n"));
+        self.warnings = c_string(&point.warnings.join("\n"));
         let turn =
             |k: usize| point.reached.as_ref().and_then(|r| r.turn_rad).map_or(f64::NAN, |turn| turn[k]);
         let metres = |of: fn(&armcal_compensate::Reached) -> f64| point.reached.as_ref().map_or(f64::NAN, of);
@@ -235,19 +235,19 @@ pub unsafe extern "C" fn armcal_arm_load(
     length: usize,
     arm: *mut *const ArmHandle,
 ) -> Code {
-    guarded(|| {
+    run_guarded(|| {
         if json.is_null() {
-            return Err(null("json"));
+            return Err(null_argument("json"));
         }
         // SAFETY: the contract: as many bytes as said.
         let bytes = unsafe { std::slice::from_raw_parts(json.cast::<u8>(), length) };
         let loaded = CalibratedArm::from_json(&String::from_utf8_lossy(bytes))?;
-        let all = |names: &mut dyn Iterator<Item = &str>| names.map(text).collect::<Vec<CString>>();
+        let all = |names: &mut dyn Iterator<Item = &str>| names.map(c_string).collect::<Vec<CString>>();
         let names = [
             all(&mut loaded.joints().iter().map(String::as_str)),
             all(&mut loaded.tips()),
             all(&mut loaded.file.recordings.iter().map(|r| r.name.as_str())),
-            loaded.effects().map(|effect| text(&effect)).collect(),
+            loaded.effects().map(|effect| c_string(&effect)).collect(),
             all(&mut loaded.file.missing.iter().map(String::as_str)),
         ];
         let handle = Arc::into_raw(Arc::new(ArmHandle { arm: loaded, names }));
@@ -299,9 +299,9 @@ pub unsafe extern "C" fn armcal_motion_new(
     conditions: *const CConditions,
     motion: *mut *mut MotionHandle,
 ) -> Code {
-    guarded(|| {
+    run_guarded(|| {
         if arm.is_null() {
-            return Err(null("arm"));
+            return Err(null_argument("arm"));
         }
         // SAFETY: the contract: a handle, which this one keeps alive.
         let arm = unsafe {
@@ -336,14 +336,16 @@ pub unsafe extern "C" fn armcal_motion_free(motion: *mut MotionHandle) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armcal_motion_start(motion: *mut MotionHandle, joint: *const f64) -> Code {
     // SAFETY: the contract: NULL or a handle, and NULL or a number a joint.
-    with(unsafe { motion.as_mut() }, |handle| handle.motion.start(unsafe { numbers(joint, handle.joints) }))
+    with_motion(unsafe { motion.as_mut() }, |handle| {
+        handle.motion.start(unsafe { numbers(joint, handle.joints) })
+    })
 }
 
 /// The arm goes there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn armcal_motion_go(motion: *mut MotionHandle, joint: *const f64) -> Code {
     // SAFETY: the contract: NULL or a handle, and a number a joint.
-    with(unsafe { motion.as_mut() }, |handle| {
+    with_motion(unsafe { motion.as_mut() }, |handle| {
         handle.motion.go(unsafe { needed(joint, handle.joints, "joint") }?)
     })
 }
@@ -359,7 +361,7 @@ pub unsafe extern "C" fn armcal_motion_tip(
     tip: *mut CPose,
 ) -> Code {
     // SAFETY: the contract: NULL or a handle.
-    with(unsafe { motion.as_ref() }, |handle| {
+    with_motion(unsafe { motion.as_ref() }, |handle| {
         // SAFETY: the contract: NULL or a number a joint, room for a pose.
         unsafe {
             let of_joints = |at: *const f64| numbers(at, handle.joints);
@@ -382,7 +384,7 @@ pub unsafe extern "C" fn armcal_motion_nominal_tip(
     tip: *mut CPose,
 ) -> Code {
     // SAFETY: the contract: NULL or a handle.
-    with(unsafe { motion.as_ref() }, |handle| {
+    with_motion(unsafe { motion.as_ref() }, |handle| {
         // SAFETY: the contract: a number a joint, room for a pose.
         unsafe {
             let joint = needed(joint, handle.joints, "joint")?;
@@ -402,11 +404,11 @@ pub unsafe extern "C" fn armcal_motion_correct(
     reached: *mut CReached,
 ) -> Code {
     // SAFETY: the contract: NULL or a handle.
-    with(unsafe { motion.as_mut() }, |handle| {
+    with_motion(unsafe { motion.as_mut() }, |handle| {
         // SAFETY: the contract: a number a joint, NULL or room for what is asked.
         unsafe {
             let nominal = needed(nominal, handle.joints, "nominal")?;
-            let point = handle.motion.correct(nominal, known(time_s))?;
+            let point = handle.motion.correct(nominal, unless_nan(time_s))?;
             handle.answer(&point, [ptr::null_mut(), corrected, direction], reached);
             Ok(())
         }
@@ -426,7 +428,7 @@ pub unsafe extern "C" fn armcal_motion_set_point(
     reached: *mut CReached,
 ) -> Code {
     // SAFETY: the contract: NULL or a handle.
-    with(unsafe { motion.as_mut() }, |handle| {
+    with_motion(unsafe { motion.as_mut() }, |handle| {
         // SAFETY: the contract: three numbers, NULL or four, NULL or room for what is asked.
         unsafe {
             let position = needed(position_m, 3, "position_m")?;
@@ -434,7 +436,7 @@ pub unsafe extern "C" fn armcal_motion_set_point(
             let place = Point {
                 position_m: Vector3::from_column_slice(position),
                 orientation: turned.map(UnitQuaternion::new_normalize),
-                time_s: known(time_s),
+                time_s: unless_nan(time_s),
             };
             let point = handle.motion.set_point(&place)?;
             handle.answer(&point, [nominal, corrected, direction], reached);
@@ -457,7 +459,7 @@ pub unsafe extern "C" fn armcal_motion_path(
     reached: *mut CReached,
 ) -> Code {
     // SAFETY: the contract: NULL or a handle.
-    with(unsafe { motion.as_mut() }, |handle| {
+    with_motion(unsafe { motion.as_mut() }, |handle| {
         let joints = handle.joints;
         let count = points.checked_mul(joints).filter(|n| *n <= isize::MAX as usize / size_of::<f64>());
         let count =
@@ -477,7 +479,7 @@ pub unsafe extern "C" fn armcal_motion_path(
                 }
                 warnings.extend(point.warnings.iter().map(|words| format!("{k}: {words}")));
             }
-            handle.warnings = text(&warnings.join("\n"));
+            handle.warnings = c_string(&warnings.join("\n"));
             Ok(())
         }
     })

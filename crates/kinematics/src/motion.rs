@@ -1,7 +1,7 @@
 //! One arm on its way: where it stands, and what the way there left behind in its gears.
 
 use crate::{CalibratedArm, Conditions, KinematicsError};
-use armcal_compensate::{Compensator, ORIENTING_JOINTS, Past, SetPoint, TargetFrame, Underway, held};
+use armcal_compensate::{Compensator, ORIENTING_JOINTS, Past, SetPoint, TargetFrame, Underway, held_joints};
 use armcal_core::{FeatureId, Observation, Pose};
 use armcal_model::Model;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -54,7 +54,7 @@ impl<'a> Motion<'a> {
             arm,
             frame,
             tip,
-            held: held(&arm.models.geometry, tip, &drive),
+            held: held_joints(&arm.models.geometry, tip, &drive),
             limits: compensator.limits.0.clone(),
             underway: Underway::from(None, arm.joint_count()),
             compensator,
@@ -138,7 +138,7 @@ impl<'a> Motion<'a> {
         target.time_s = time_s;
         self.hold(nominal_rad);
         let found = self.compensator.corrected(&target, nominal_rad.to_vec(), &mut self.underway)?;
-        last(found)
+        last_point(found)
     }
 
     /// The set-points of a path: as [`Motion::correct`] one after the other, each with its time [s], but a joint that turns back
@@ -195,7 +195,7 @@ impl<'a> Motion<'a> {
             return Err(KinematicsError::argument("start", problem));
         }
         self.hold(stands_rad.as_deref().unwrap_or_default());
-        last(self.compensator.next(&target, &mut self.underway)?)
+        last_point(self.compensator.next(&target, &mut self.underway)?)
     }
 
     /// Lets joints that are not to move stay where they are.
@@ -241,6 +241,6 @@ impl<'a> Motion<'a> {
 }
 
 /// The target, which comes last.
-fn last(points: Vec<SetPoint>) -> Result<SetPoint, KinematicsError> {
+fn last_point(points: Vec<SetPoint>) -> Result<SetPoint, KinematicsError> {
     points.into_iter().next_back().ok_or_else(|| armcal_compensate::CompensateError::NoTargets.into())
 }

@@ -226,5 +226,5 @@ fn an_arm_is_for_many_threads_and_a_motion_for_one_after_the_other() {
 
 #[test]
 fn a_panic_stops_at_the_border() {
-    assert_eq!(crate::c_abi::guarded(|| panic!("meant")), crate::c_abi::Code::Internal);
+    assert_eq!(crate::c_abi::run_guarded(|| panic!("meant")), crate::c_abi::Code::Internal);
 }

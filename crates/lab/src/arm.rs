@@ -6,7 +6,7 @@
 //! common normal by `a`, the next axis twisted about that normal by `alpha`.
 
 use crate::config::DhRow;
-use crate::screw::{Line, pose, turn};
+use crate::screw::{Line, pose_from_axes, rotate_vector};
 use armcal_core::Pose;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
 
@@ -40,9 +40,9 @@ impl AxisArm {
                 axes.push(Line { point_m: point, direction: z });
                 ends.push(point);
             }
-            x = turn(&z, &x, row.theta_rad());
+            x = rotate_vector(&z, &x, row.theta_rad());
             point += z * row.d_m + x * row.a_m;
-            z = turn(&x, &z, row.alpha_rad());
+            z = rotate_vector(&x, &z, row.alpha_rad());
             if let Some(end) = ends.last_mut() {
                 *end = point;
             }
@@ -84,9 +84,10 @@ impl AxisArm {
         axes: [Vector3<f64>; 3],
         joint_rad: &[f64],
     ) -> Pose {
-        let turned =
-            |axis| (0..=link).rev().fold(axis, |v, j| turn(&self.axes[j].direction, &v, joint_rad[j]));
-        pose(self.carried(link, at_m, joint_rad), &axes.map(turned))
+        let turned = |axis| {
+            (0..=link).rev().fold(axis, |v, j| rotate_vector(&self.axes[j].direction, &v, joint_rad[j]))
+        };
+        pose_from_axes(self.carried(link, at_m, joint_rad), &axes.map(turned))
     }
 
     /// The tip [m, base frame].
@@ -115,7 +116,7 @@ impl AxisArm {
         let centres = self.mass_centres_m.iter_mut().skip(link + 1);
         centres.for_each(|centre| *centre = line.turn_point(centre, angle_rad));
         self.tip_m = line.turn_point(&self.tip_m, angle_rad);
-        self.tip_axes = self.tip_axes.map(|axis| turn(&line.direction, &axis, angle_rad));
+        self.tip_axes = self.tip_axes.map(|axis| rotate_vector(&line.direction, &axis, angle_rad));
     }
 
     /// Shifts everything beyond the end of link `link` [m], all in the zero position.

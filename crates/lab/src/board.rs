@@ -1,7 +1,7 @@
 //! The calibration board: as drawn, as machined, as tilted.
 
 use crate::random::{Purpose, Stream};
-use crate::screw::{Line, pose, turn};
+use crate::screw::{Line, pose_from_axes, rotate_vector};
 use crate::{LabError, config};
 use armcal_core::Pose;
 use armcal_recording::input;
@@ -69,11 +69,11 @@ struct CavityTable {
 impl Board {
     /// Reads a board file and machines one such board: every cavity off by its tolerance, the file's or `true_mm`.
     pub fn machine(path: &Path, seed: u64, true_mm: Option<f64>) -> Result<Board, LabError> {
-        let file: BoardFile = config::parse("board file", &drawing(path)?, path)?;
-        config::not_negative("cavity_sigma_mm", file.cavity_sigma_mm)?;
-        config::not_negative("seat_sigma_mm", file.seat_sigma_mm)?;
+        let file: BoardFile = config::parse_toml("board file", &read_drawing(path)?, path)?;
+        config::check_not_negative("cavity_sigma_mm", file.cavity_sigma_mm)?;
+        config::check_not_negative("seat_sigma_mm", file.seat_sigma_mm)?;
         if file.cavities.is_empty() {
-            return Err(config::value("cavities", format!("{} has none", path.display())));
+            return Err(config::value_error("cavities", format!("{} has none", path.display())));
         }
         let tolerance_mm = true_mm.unwrap_or(file.cavity_sigma_mm);
         let mut tolerance = Stream::new(seed, Purpose::Board, 0);
@@ -102,7 +102,7 @@ impl Board {
             return if roll_deg == 0.0 && pitch_deg == 0.0 {
                 Ok(Pose::identity())
             } else {
-                Err(config::value(
+                Err(config::value_error(
                     "recordings",
                     "asks for a tilt, but the board file has no [mechanism]".into(),
                 ))
@@ -125,7 +125,7 @@ impl Board {
             if angle.is_nan() || angle.abs() > limit {
                 let why =
                     format!("recording `{recording}`: the mechanism stops at {limit} deg, asked for {angle}");
-                return Err(config::value(&format!("recordings.{axis}_deg"), why));
+                return Err(config::value_error(&format!("recordings.{axis}_deg"), why));
             }
         }
         Ok(())
@@ -139,7 +139,7 @@ pub const BUILTIN: &str = "builtin:paper";
 pub const PAPER: &str = include_str!("../../../pipelines/boards/paper.toml");
 
 /// The text of a board file.
-pub fn drawing(path: &Path) -> Result<String, LabError> {
+pub fn read_drawing(path: &Path) -> Result<String, LabError> {
     if path.ends_with(BUILTIN) {
         return Ok(PAPER.to_owned());
     }
@@ -153,7 +153,7 @@ impl TiltMechanism {
         let line = |key: &str, axis: [f64; 3]| {
             let direction = Vector3::from(axis);
             if !direction.iter().all(|v| v.is_finite()) || direction.norm() < 1e-6 {
-                return Err(config::value(&format!("mechanism.{key}"), "is not a direction".into()));
+                return Err(config::value_error(&format!("mechanism.{key}"), "is not a direction".into()));
             }
             Ok(Line { point_m: pivot, direction: direction.normalize() })
         };
@@ -167,9 +167,14 @@ impl TiltMechanism {
 
     fn pose(&self, roll_rad: f64, pitch_rad: f64) -> Pose {
         let origin = self.pitch.turn_point(&self.roll.turn_point(&Vector3::zeros(), roll_rad), pitch_rad);
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()]
-            .map(|v| turn(&self.pitch.direction, &turn(&self.roll.direction, &v, roll_rad), pitch_rad));
-        pose(origin, &axes)
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|v| {
+            rotate_vector(
+                &self.pitch.direction,
+                &rotate_vector(&self.roll.direction, &v, roll_rad),
+                pitch_rad,
+            )
+        });
+        pose_from_axes(origin, &axes)
     }
 }
 

@@ -11,7 +11,7 @@ use crate::hand::Tremor;
 use crate::mechanism::{Body, Mechanism, RigState};
 use crate::random::{Purpose, Stream};
 use crate::rig::{BoardPlace, Rig};
-use crate::servo::{Servo, counted};
+use crate::servo::{Servo, quantise_angle};
 use crate::spline::Path;
 use crate::trace::{Rest, STEP_S, Trace};
 use armcal_core::Pose;
@@ -165,7 +165,7 @@ impl<'a> Engine<'a> {
         if self.pace == Pace::Quick {
             first = self.quick_hold(duration_s);
         } else {
-            (0..steps(duration_s)).for_each(|_| self.motor_step());
+            (0..step_count(duration_s)).for_each(|_| self.motor_step());
         }
         self.note(rest, first);
     }
@@ -322,7 +322,7 @@ impl<'a> Engine<'a> {
     }
 
     fn counted(&self, angle_rad: f64) -> f64 {
-        counted(angle_rad, self.config.joints.count_rad())
+        quantise_angle(angle_rad, self.config.joints.count_rad())
     }
 
     fn unreachable(&self, arm: &'static str, what: &str, short_by_m: f64) -> LabError {
@@ -335,6 +335,6 @@ impl<'a> Engine<'a> {
     }
 }
 
-fn steps(duration_s: f64) -> usize {
+fn step_count(duration_s: f64) -> usize {
     (duration_s / STEP_S).round() as usize
 }

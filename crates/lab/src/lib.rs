@@ -84,7 +84,7 @@ pub fn simulate_with(
 ) -> Result<Simulated, LabError> {
     note_inputs(config, base_dir);
     may_write(config.recordings.iter().map(|r| r.name.as_str()), out_dir, &out_dir.join(TRUTH))?;
-    let (truth, logs) = run(config, base_dir, mechanisms)?;
+    let (truth, logs) = simulate_in_memory(config, base_dir, mechanisms)?;
     let recordings = write_recordings(&truth, &logs, out_dir)?;
     let path = out_dir.join(TRUTH);
     truth::write_json(&truth, &path)?;
@@ -101,8 +101,8 @@ pub(crate) fn recording_file(name: &str) -> String {
 
 /// The files that a configuration names are inputs, before anything is written.
 fn note_inputs(config: &LabConfig, base_dir: &Path) {
-    input::note(&base_dir.join(&config.board.file));
-    config.task.set_points.iter().for_each(|told| input::note(&base_dir.join(&told.file)));
+    input::register_path(&base_dir.join(&config.board.file));
+    config.task.set_points.iter().for_each(|told| input::register_path(&base_dir.join(&told.file)));
 }
 
 /// Whether recordings of these names and their truth may be written, before they are made.
@@ -130,7 +130,7 @@ pub(crate) fn make_folder(path: &Path) -> Result<(), LabError> {
 }
 
 /// Simulates a session without writing anything: the truth, and one log a recording.
-pub fn run(
+pub fn simulate_in_memory(
     config: &LabConfig,
     base_dir: &Path,
     mechanisms: &MechanismFactory<'_>,
@@ -140,7 +140,7 @@ pub fn run(
     // Recordings have random streams of their own, so the threads cannot disturb each other.
     let simulate = |recording| {
         let hidden = hidden_in(config).chain(mechanisms(recording)).collect();
-        one(config, &rig, recording, hidden)
+        simulate_recording(config, &rig, recording, hidden)
     };
     let made: Vec<Result<(RecordingTruth, Log), LabError>> = std::thread::scope(|scope| {
         let start = |recording| {
@@ -169,7 +169,7 @@ fn hidden_in(config: &LabConfig) -> impl Iterator<Item = Box<dyn Mechanism>> {
     config.mechanisms.iter().map(|m| m.mechanism())
 }
 
-fn one(
+fn simulate_recording(
     config: &LabConfig,
     rig: &Rig,
     recording: usize,
@@ -179,9 +179,9 @@ fn one(
     if session.trace.duration_s() > config.interval_s && recording + 1 < config.recordings.len() {
         let took_s = session.trace.duration_s().ceil();
         let why = format!("is {}, but a recording takes {took_s} s", config.interval_s);
-        return Err(config::value("interval_s", why));
+        return Err(config::value_error("interval_s", why));
     }
-    let log = sensors::observe(config, recording, &session);
+    let log = sensors::record_session(config, recording, &session);
     let occlusions = log.occlusions.clone();
     let truth = RecordingTruth::of_session(config, rig, recording, &session, log.clock, occlusions);
     Ok((truth, log))

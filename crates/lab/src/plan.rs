@@ -36,10 +36,10 @@ impl Plan {
         recording: usize,
     ) -> Result<Plan, LabError> {
         let mut draw = Stream::new(config.seed, Purpose::Task, 2 * recording);
-        let visits = visits(&config.task, rig.board.cavities.len(), &mut draw);
+        let visits = draw_visits(&config.task, rig.board.cavities.len(), &mut draw);
         // A stream of its own, so that another number of visits leaves the free poses as they were.
         let mut draw = Stream::new(config.seed, Purpose::Task, 2 * recording + 1);
-        let sweep_m = sweep(config.task.sweep.points, place, &mut draw);
+        let sweep_m = draw_sweep(config.task.sweep.points, place, &mut draw);
         let free_rad = free_poses(&config.task.free, &rig.nominal, place, &mut draw).map_err(|found| {
             LabError::NoFreePose {
                 recording: config.recordings[recording].name.clone(),
@@ -51,7 +51,7 @@ impl Plan {
     }
 }
 
-fn visits(task: &TaskConfig, cavities: usize, draw: &mut Stream) -> Vec<Visit> {
+fn draw_visits(task: &TaskConfig, cavities: usize, draw: &mut Stream) -> Vec<Visit> {
     let mut visits = Vec::new();
     for (pass, config) in task.passes.iter().enumerate() {
         let mut order: Vec<usize> = (0..cavities).collect();
@@ -76,7 +76,7 @@ fn visits(task: &TaskConfig, cavities: usize, draw: &mut Stream) -> Vec<Visit> {
 }
 
 /// Waypoints 80 to 200 mm above the board, spread over it.
-fn sweep(points: usize, place: &BoardPlace, draw: &mut Stream) -> Vec<Vector3<f64>> {
+fn draw_sweep(points: usize, place: &BoardPlace, draw: &mut Stream) -> Vec<Vector3<f64>> {
     let mut waypoint = || {
         let across =
             Vector3::new(draw.uniform([-0.1, 0.1]), draw.uniform([-0.18, 0.18]), draw.uniform([0.08, 0.2]));
@@ -133,7 +133,7 @@ mod tests {
         let mut task = TaskConfig { skip_share: 0.0, swap_share: 0.0, ..TaskConfig::default() };
         task.passes.push(PassConfig { order: Order::Random, share: 0.3 });
         let mut draw = Stream::new(3, Purpose::Task, 0);
-        let drawn = visits(&task, 10, &mut draw);
+        let drawn = draw_visits(&task, 10, &mut draw);
         let of = |pass| drawn.iter().filter(|v| v.pass == pass).map(|v| v.cavity).collect::<Vec<_>>();
         assert_eq!(of(0), (0..10).collect::<Vec<_>>());
         assert_eq!(of(1), (0..10).rev().collect::<Vec<_>>());
@@ -144,7 +144,7 @@ mod tests {
     fn some_visits_are_skipped_and_some_swapped_but_none_doubled() {
         let task = TaskConfig { skip_share: 0.1, swap_share: 0.1, ..TaskConfig::default() };
         let mut draw = Stream::new(3, Purpose::Task, 0);
-        let drawn = visits(&task, 500, &mut draw);
+        let drawn = draw_visits(&task, 500, &mut draw);
         let mut forward: Vec<usize> = drawn.iter().filter(|v| v.pass == 0).map(|v| v.cavity).collect();
         assert!((420..480).contains(&forward.len()), "{}", forward.len());
         let swapped = forward.windows(2).filter(|w| w[0] > w[1]).count();

@@ -9,7 +9,7 @@ mod nominal;
 mod reading;
 
 pub use nominal::{Nominal, NominalBoard};
-pub(crate) use reading::encoders;
+pub(crate) use reading::mean_encoder_readings;
 
 use crate::config::LabConfig;
 use crate::engine::Pace;
@@ -66,7 +66,7 @@ pub fn observe_from(config: &LabConfig, base_dir: &Path) -> Result<Observed, Lab
     for recording in 0..config.recordings.len() {
         let mechanisms = hidden_in(config).collect();
         let session = Session::perform(config, &rig, recording, mechanisms, Pace::Quick)?;
-        observations.extend(dwells(config, &rig, recording, &session));
+        observations.extend(observe_dwells(config, &rig, recording, &session));
         frames.push([Body::Base, Body::Table].map(|body| nominal::mean_pose(&session.trace, body)));
         let clock = SensorClock::draw(config, recording);
         truth.recordings.push(RecordingTruth::of_session(
@@ -87,7 +87,7 @@ fn dwell_s(session: &Session, rest: &Rest) -> [f64; 2] {
     [began_s + 0.05, session.trace.time_s[rest.last]]
 }
 
-fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) -> Vec<Observation> {
+fn observe_dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) -> Vec<Observation> {
     let mut draw = Stream::new(config.seed, Purpose::Quick, 2 * recording);
     let duration_s = session.trace.duration_s();
     let mut camera = Camera::new(config, recording, duration_s);
@@ -102,7 +102,8 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
         }
         let readings = ((span_s[1] - span_s[0]) * config.joints.rate_hz).min(MOST_READINGS);
         let read_rad = &session.trace.reading_rad[rest.last];
-        let [joint_rad, joint_sigma_rad] = encoders(&config.joints, read_rad, readings, &mut draw);
+        let [joint_rad, joint_sigma_rad] =
+            mean_encoder_readings(&config.joints, read_rad, readings, &mut draw);
         let seen = camera.tip(&session.trace.seen_tip[rest.last], span_s);
         let (reference, covariance_m2) = match (rest.kind, rest.cavity) {
             (RestKind::Seated, Some(cavity)) => {
@@ -121,14 +122,20 @@ fn dwells(config: &LabConfig, rig: &Rig, recording: usize, session: &Session) ->
             feature: FeatureId::TIP,
             dwell: DwellId { recording, dwell },
             time_ns: config.start_ns(recording) + (mid_s * 1e9).round() as i64,
-            arrival: motion_history::arrivals(since, &joint_rad, config.joints.count_rad()),
-            path_memory_rad: Some(motion_history::memories(since, &joint_rad, config.joints.count_rad())),
+            arrival: motion_history::arrival_directions(since, &joint_rad, config.joints.count_rad()),
+            path_memory_rad: Some(motion_history::path_memories(
+                since,
+                &joint_rad,
+                config.joints.count_rad(),
+            )),
             pair_memory_rad: Some(motion_history::pair_memories(
                 since,
                 &joint_rad,
                 config.joints.count_rad(),
             )),
-            moved_rad: observations.last().map(|before| motion_history::moved(&before.joint_rad, &joint_rad)),
+            moved_rad: observations
+                .last()
+                .map(|before| motion_history::joint_moves_rad(&before.joint_rad, &joint_rad)),
             joint_velocity_radps: None,
             joint_rad,
             joint_sigma_rad,

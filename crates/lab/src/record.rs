@@ -10,11 +10,11 @@ use std::path::Path;
 
 /// Writes one recording. The file appears complete or not at all.
 pub fn write(path: &Path, rig: &str, recording: &str, log: &Log) -> Result<(), LabError> {
-    put(path, rig, recording, log)
+    write_mcap(path, rig, recording, log)
         .map_err(|source| LabError::Recording { path: path.to_owned(), source: Box::new(source) })
 }
 
-fn put(path: &Path, rig: &str, recording: &str, log: &Log) -> Result<(), RecordingError> {
+fn write_mcap(path: &Path, rig: &str, recording: &str, log: &Log) -> Result<(), RecordingError> {
     let mut output = McapOutput::create(path, "ros2")?;
     let nothing = BTreeMap::new();
     let ids = log

@@ -16,7 +16,7 @@ pub use design::{Design, Driving};
 pub use hidden::Hidden;
 pub use seal::{Sealed, seal};
 
-use crate::config::{LabConfig, parse, value};
+use crate::config::{LabConfig, parse_toml, value_error};
 use crate::random::{Purpose, Stream};
 use crate::{LabError, Observed, observe};
 use families::Draw;
@@ -28,7 +28,7 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// A family of [`families`], one of [`nothing`] or [`outside`], or several joined by `+`.
+    /// A family of [`catalogue_families`], one of [`null_families`] or [`uncatalogued_families`], or several joined by `+`.
     pub family: String,
     /// Joint, from 1, or for events the recording, from 0; drawn when absent. Of several families: of the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -72,23 +72,23 @@ pub struct Planted {
 }
 
 /// The families whose names are in the product's catalogue.
-pub fn families() -> Vec<&'static str> {
+pub fn catalogue_families() -> Vec<&'static str> {
     families::FAMILIES.iter().map(|family| family.name).collect()
 }
 
 /// The ways of hiding nothing listed: noise as declared, noise that is worse, and a smooth displacement that has no name.
-pub fn nothing() -> Vec<&'static str> {
+pub fn null_families() -> Vec<&'static str> {
     let displaced = discrepancy::FAMILIES.iter().map(|family| family.name);
     design::NOTHING.into_iter().chain(displaced).collect()
 }
 
 /// The mechanisms that are in no catalogue.
-pub fn outside() -> Vec<&'static str> {
+pub fn uncatalogued_families() -> Vec<&'static str> {
     outside::FAMILIES.iter().map(|family| family.name).collect()
 }
 
 /// Families to hide two at a time: a large effect beside a small one, two of one driver, two events.
-pub fn pairs() -> Vec<&'static str> {
+pub fn family_pairs() -> Vec<&'static str> {
     PAIRS.to_vec()
 }
 
@@ -118,14 +118,14 @@ impl Scenario {
 
     /// Draws the rig and hides what is to be hidden.
     pub fn plant(&self) -> Result<Planted, LabError> {
-        let mut config = rig(self.seed)?;
+        let mut config = paper_rig(self.seed)?;
         self.design.apply(&mut config, self.driving);
         let mut hidden = Vec::new();
         for (part, name) in self.family.split('+').map(str::trim).enumerate() {
             if design::worsen_noise(name, &mut config) {
                 continue;
             }
-            let family = family(name).ok_or_else(|| unknown(name))?;
+            let family = find_family(name).ok_or_else(|| unknown_family(name))?;
             let draw = Stream::new(self.seed, Purpose::Scenario, part);
             let target = self.target.filter(|_| part == 0);
             let planted = Draw::new(draw, target, self.size, self.design).plant(family, &mut config)?;
@@ -149,8 +149,8 @@ impl Scenario {
 const RIG: &str = "name = 'rig'\nseed = 0\nrecordings = []\nboard.file = 'builtin:paper'";
 
 /// The paper's rig of one seed, nothing hidden, nothing to do yet.
-fn rig(seed: u64) -> Result<LabConfig, LabError> {
-    let mut config = LabConfig { seed, ..parse("lab file", RIG, Path::new("rig"))? };
+fn paper_rig(seed: u64) -> Result<LabConfig, LabError> {
+    let mut config = LabConfig { seed, ..parse_toml("lab file", RIG, Path::new("rig"))? };
     config.arm.deviation.mass_percent = 25.0;
     Ok(config)
 }
@@ -160,9 +160,9 @@ fn rig(seed: u64) -> Result<LabConfig, LabError> {
 /// # Errors
 /// The first that is none, with the nearest that is one.
 pub fn check_family(words: &str) -> Result<(), LabError> {
-    let known = |name: &str| design::NOTHING.contains(&name) || family(name).is_some();
+    let known = |name: &str| design::NOTHING.contains(&name) || find_family(name).is_some();
     match words.split('+').map(str::trim).find(|name| !known(name)) {
-        Some(name) => Err(unknown(name)),
+        Some(name) => Err(unknown_family(name)),
         None => Ok(()),
     }
 }
@@ -171,21 +171,25 @@ pub fn check_family(words: &str) -> Result<(), LabError> {
 ///
 /// # Errors
 /// A word that is none, with those that are.
-pub fn word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, LabError> {
+pub fn parse_word<T: DeserializeOwned>(key: &str, text: &str) -> Result<T, LabError> {
     let parsed = serde_json::from_value(serde_json::Value::String(text.to_owned()));
     parsed.map_err(|e| LabError::Value { key: key.to_owned(), why: e.to_string() })
 }
 
-fn family(name: &str) -> Option<&'static families::Family> {
+fn find_family(name: &str) -> Option<&'static families::Family> {
     let all = families::FAMILIES.iter().chain(outside::FAMILIES).chain(discrepancy::FAMILIES);
     all.into_iter().find(|family| family.name == name)
 }
 
-fn unknown(name: &str) -> LabError {
-    let known: Vec<&str> = families().into_iter().chain(nothing()).chain(outside()).collect();
-    let nearest = armcal_recording::nearest(name, &known);
+fn unknown_family(name: &str) -> LabError {
+    let known: Vec<&str> =
+        catalogue_families().into_iter().chain(null_families()).chain(uncatalogued_families()).collect();
+    let nearest = armcal_recording::nearest_name(name, &known);
     let nearest = nearest.map(|n| format!(" (did you mean `{n}`?)")).unwrap_or_default();
-    value("scenario.family", format!("there is no family `{name}`{nearest}; they are: {}", known.join(", ")))
+    value_error(
+        "scenario.family",
+        format!("there is no family `{name}`{nearest}; they are: {}", known.join(", ")),
+    )
 }
 
 #[cfg(test)]

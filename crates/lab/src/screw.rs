@@ -16,14 +16,14 @@ pub struct Line {
 impl Line {
     /// Where a point goes when the body it belongs to turns about the line.
     pub fn turn_point(&self, point_m: &Vector3<f64>, angle_rad: f64) -> Vector3<f64> {
-        self.point_m + turn(&self.direction, &(point_m - self.point_m), angle_rad)
+        self.point_m + rotate_vector(&self.direction, &(point_m - self.point_m), angle_rad)
     }
 
     /// Where another line goes when the body it belongs to turns about this one.
     pub fn turn_line(&self, line: &Line, angle_rad: f64) -> Line {
         Line {
             point_m: self.turn_point(&line.point_m, angle_rad),
-            direction: turn(&self.direction, &line.direction, angle_rad),
+            direction: rotate_vector(&self.direction, &line.direction, angle_rad),
         }
     }
 
@@ -34,13 +34,13 @@ impl Line {
 }
 
 /// Turns `v` about the unit vector `axis`: `v cos + (k x v) sin + k (k.v)(1 - cos)`, Rodrigues 1840.
-pub fn turn(axis: &Vector3<f64>, v: &Vector3<f64>, angle_rad: f64) -> Vector3<f64> {
+pub fn rotate_vector(axis: &Vector3<f64>, v: &Vector3<f64>, angle_rad: f64) -> Vector3<f64> {
     let (sin, cos) = angle_rad.sin_cos();
     v * cos + axis.cross(v) * sin + axis * (axis.dot(v) * (1.0 - cos))
 }
 
 /// The pose of a body whose origin is at `origin_m` and whose x, y and z axes point along `axes`.
-pub fn pose(origin_m: Vector3<f64>, axes: &[Vector3<f64>; 3]) -> Pose {
+pub fn pose_from_axes(origin_m: Vector3<f64>, axes: &[Vector3<f64>; 3]) -> Pose {
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(axes));
     Pose::from_parts(origin_m.into(), UnitQuaternion::from_rotation_matrix(&rotation))
 }
@@ -61,8 +61,8 @@ mod tests {
             let axis = Unit::new_normalize(k);
             let v = Vector3::from(v);
             let exponential = (axis.cross_matrix() * angle).exp() * v;
-            prop_assert!((turn(&axis, &v, angle) - exponential).norm() < 1e-12);
-            prop_assert!((turn(&axis, &v, angle) - Rotation3::from_axis_angle(&axis, angle) * v).norm() < 1e-12);
+            prop_assert!((rotate_vector(&axis, &v, angle) - exponential).norm() < 1e-12);
+            prop_assert!((rotate_vector(&axis, &v, angle) - Rotation3::from_axis_angle(&axis, angle) * v).norm() < 1e-12);
         }
     }
 }

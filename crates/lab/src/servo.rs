@@ -74,7 +74,7 @@ impl Servo {
 }
 
 /// An angle as an encoder with `count_rad` a count reads it [rad].
-pub fn counted(angle_rad: f64, count_rad: f64) -> f64 {
+pub fn quantise_angle(angle_rad: f64, count_rad: f64) -> f64 {
     (angle_rad / count_rad).round() * count_rad
 }
 
@@ -86,7 +86,7 @@ mod tests {
     const COUNT_RAD: f64 = std::f64::consts::TAU / 65536.0;
 
     fn reading(servo: &Servo) -> Vec<f64> {
-        servo.angle_rad.iter().map(|q| counted(*q, COUNT_RAD)).collect()
+        servo.angle_rad.iter().map(|q| quantise_angle(*q, COUNT_RAD)).collect()
     }
 
     fn run(servo: &mut Servo, set_point: &[f64], load: &[f64], steps: usize) {

@@ -2,7 +2,7 @@
 
 use crate::LabError;
 use crate::commands::Commands;
-use crate::config::{LabConfig, StopConfig, value};
+use crate::config::{LabConfig, StopConfig, value_error};
 use crate::engine::{Engine, Pace};
 use crate::mechanism::Mechanism;
 use crate::plan::{Plan, Visit};
@@ -50,7 +50,7 @@ impl Session {
         let plan = Plan::draw(config, rig, &place, recording)?;
         let mut engine = Engine::new(config, rig, &place, recording, mechanisms, pace);
         let home: Vec<f64> = config.arm.home_deg.iter().map(|deg| deg.to_radians()).collect();
-        let at_home = || Some(rest(RestKind::Free));
+        let at_home = || Some(empty_rest(RestKind::Free));
 
         engine.hold(config.task.home_s, at_home());
         if !plan.sweep_m.is_empty() {
@@ -61,7 +61,7 @@ impl Session {
         let mut visits = Visits::new(config, rig, &place, recording);
         let mut pauses = Stream::new(config.seed, Purpose::Pauses, 2 * recording + 1);
         if let Some(commands) = rig.commands.iter().find(|commands| commands.recording == *name) {
-            due = obey(&mut engine, commands, &home);
+            due = follow_set_points(&mut engine, commands, &home);
         } else if let Some(tour) = config.task.tours.iter().find(|tour| tour.recording == *name) {
             visits.tour(&mut engine, &tour.stops, &mut pauses)?;
         } else {
@@ -80,23 +80,23 @@ impl Session {
 }
 
 /// Drives the arm along set-points from a file, from home.
-fn obey(engine: &mut Engine<'_>, commands: &Commands, home: &[f64]) -> Vec<Due> {
+fn follow_set_points(engine: &mut Engine<'_>, commands: &Commands, home: &[f64]) -> Vec<Due> {
     engine.drive_joints(home, commands.speed_rad_s);
-    engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+    engine.hold(commands.hold_s, Some(empty_rest(RestKind::Free)));
     let Some(time_s) = &commands.time_s else {
         let mut stop = |joint_rad: &Vec<f64>| {
             engine.drive_joints(joint_rad, commands.speed_rad_s);
             let first = engine.last_step();
-            engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+            engine.hold(commands.hold_s, Some(empty_rest(RestKind::Free)));
             let last = engine.last_step();
             Due { joint_rad: joint_rad.clone(), first: first + (last - first) / 2, last }
         };
         return commands.joint_rad.iter().map(&mut stop).collect();
     };
     engine.drive_joints(&commands.joint_rad[0], commands.speed_rad_s);
-    engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+    engine.hold(commands.hold_s, Some(empty_rest(RestKind::Free)));
     let steps = engine.follow_joints(time_s, &commands.joint_rad);
-    engine.hold(commands.hold_s, Some(rest(RestKind::Free)));
+    engine.hold(commands.hold_s, Some(empty_rest(RestKind::Free)));
     let due = |(q, step): (&Vec<f64>, usize)| Due { joint_rad: q.clone(), first: step, last: step };
     commands.joint_rad.iter().zip(steps).map(due).collect()
 }
@@ -156,7 +156,7 @@ impl<'a> Visits<'a> {
                 StopConfig::Cavity { name, slide_from_deg } => {
                     let found = self.rig.board.cavities.iter().position(|cavity| cavity.name == *name);
                     let cavity = found.ok_or_else(|| {
-                        value("task.tours.stops", format!("cavity `{name}` is not on the board"))
+                        value_error("task.tours.stops", format!("cavity `{name}` is not on the board"))
                     })?;
                     let side = slide_from_deg.map(f64::to_radians);
                     let travel = side.map_or(Vector3::zeros(), |s| -Vector3::new(s.cos(), s.sin(), 0.0));
@@ -193,8 +193,12 @@ impl<'a> Visits<'a> {
         let (hand, task) = (&self.config.hand, &self.config.task);
         let cavity = &self.rig.board.cavities[visit.cavity];
         let what = format!("cavity `{}`", cavity.name);
-        let marked =
-            |kind, seat_m| Rest { cavity: Some(visit.cavity), pass: Some(visit.pass), seat_m, ..rest(kind) };
+        let marked = |kind, seat_m| Rest {
+            cavity: Some(visit.cavity),
+            pass: Some(visit.pass),
+            seat_m,
+            ..empty_rest(kind)
+        };
         let above = cavity.drawn_m + Vector3::z() * (task.transit_height_mm * 1e-3);
         let waypoint = self.place.base_from_board * Point3::from(above);
         engine.drive_through(&[waypoint.coords], task.speed_m_s, &what)?;
@@ -248,21 +252,21 @@ fn hold_free(
 ) -> Result<(), LabError> {
     let speed_m_s = config.task.free.speed_m_s;
     if config.task.free.by_hand {
-        engine.lead_to_pose(joint_rad, speed_m_s, hold_s, rest(RestKind::Free));
+        engine.lead_to_pose(joint_rad, speed_m_s, hold_s, empty_rest(RestKind::Free));
     } else {
         engine.drive_to_pose(joint_rad, speed_m_s, what)?;
-        engine.hold(hold_s, Some(rest(RestKind::Free)));
+        engine.hold(hold_s, Some(empty_rest(RestKind::Free)));
     }
     Ok(())
 }
 
-fn rest(kind: RestKind) -> Rest {
+fn empty_rest(kind: RestKind) -> Rest {
     Rest { kind, cavity: None, pass: None, seat_m: None, first: 0, last: 0 }
 }
 
 /// Where a slide begins, seen from the cavity: behind it along the direction of travel, turned on the board.
 fn slide_direction(travel: &Vector3<f64>, turned_rad: f64) -> Vector3<f64> {
-    crate::screw::turn(&Vector3::z(), &-Vector3::new(travel.x, travel.y, 0.0), turned_rad)
+    crate::screw::rotate_vector(&Vector3::z(), &-Vector3::new(travel.x, travel.y, 0.0), turned_rad)
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ fn short() -> LabConfig {
 }
 
 fn go(config: &LabConfig) -> (Truth, Vec<Log>) {
-    run(config, Path::new(LABS), &nothing_hidden).unwrap()
+    simulate_in_memory(config, Path::new(LABS), &nothing_hidden).unwrap()
 }
 
 static SMALL: LazyLock<(Truth, Vec<Log>)> = LazyLock::new(|| go(&lab("paper-small.toml")));
@@ -246,10 +246,10 @@ fn the_same_seed_gives_the_same_bytes_and_another_one_others() {
 fn what_cannot_be_reached_is_named() {
     let mut config = short();
     config.board.in_base.xyz_m = [0.9, 0.0, 0.1];
-    let error = run(&config, Path::new(LABS), &nothing_hidden).unwrap_err().to_string();
+    let error = simulate_in_memory(&config, Path::new(LABS), &nothing_hidden).unwrap_err().to_string();
     assert!(error.contains("normal") && error.contains("mm away from"), "{error}");
     config.board.file = "no/such.toml".into();
-    let error = run(&config, Path::new(LABS), &nothing_hidden).unwrap_err().to_string();
+    let error = simulate_in_memory(&config, Path::new(LABS), &nothing_hidden).unwrap_err().to_string();
     assert!(error.contains("no/such.toml"), "{error}");
 }
 
@@ -293,7 +293,7 @@ fn a_mechanism_plugs_in_from_outside() {
     };
     let mut config = short();
     config.task.passes[0] = config::PassConfig { order: config::Order::Random, share: 0.8 };
-    let (truth, _) = run(&config, Path::new(LABS), &hidden).unwrap();
+    let (truth, _) = simulate_in_memory(&config, Path::new(LABS), &hidden).unwrap();
     let recording = &truth.recordings[0];
     assert_eq!(recording.mechanisms[0].name, "play");
     let (mut flanks, mut seated) = ([0, 0], 0);

@@ -101,7 +101,7 @@ impl Trace {
 }
 
 /// The two steps around `time_s` and the share of the later one; the ends hold beyond the ends.
-pub fn around(time_s: f64, steps: usize) -> (usize, usize, f64) {
+pub fn bracketing_steps(time_s: f64, steps: usize) -> (usize, usize, f64) {
     let at = (time_s / STEP_S).clamp(0.0, steps.saturating_sub(1) as f64);
     let below = at.floor() as usize;
     (below, (below + 1).min(steps.saturating_sub(1)), at - below as f64)
@@ -109,13 +109,13 @@ pub fn around(time_s: f64, steps: usize) -> (usize, usize, f64) {
 
 /// A column of joint rows at `time_s`, linearly interpolated.
 pub fn row_at(rows: &[Vec<f64>], time_s: f64) -> Vec<f64> {
-    let (below, above, share) = around(time_s, rows.len());
+    let (below, above, share) = bracketing_steps(time_s, rows.len());
     rows[below].iter().zip(&rows[above]).map(|(a, b)| a + (b - a) * share).collect()
 }
 
 /// A column of poses at `time_s`, interpolated.
 pub fn pose_at(poses: &[Pose], time_s: f64) -> Pose {
-    let (below, above, share) = around(time_s, poses.len());
+    let (below, above, share) = bracketing_steps(time_s, poses.len());
     let (a, b) = (&poses[below], &poses[above]);
     Isometry3::from_parts(
         Translation3::from(a.translation.vector.lerp(&b.translation.vector, share)),

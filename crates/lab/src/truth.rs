@@ -187,7 +187,7 @@ impl Truth {
             schema: "armcal.truth/1".into(),
             config: config.clone(),
             rows: rig.built_rows.clone(),
-            deviations: deviations(&config.arm.rows, &rig.built_rows),
+            deviations: row_deviations(&config.arm.rows, &rig.built_rows),
             world_from_base: (&rig.world_from_base).into(),
             base_from_plate: (&rig.base_from_plate).into(),
             world_from_table: (&rig.world_from_table).into(),
@@ -254,7 +254,7 @@ impl RecordingTruth {
 
 impl DwellTruth {
     fn of_rest(rig: &Rig, trace: &Trace, rest: &Rest, recording_start_ns: i64) -> DwellTruth {
-        let first = settled(trace, rest);
+        let first = first_still_step(trace, rest);
         let rows = first..=rest.last;
         let tip_at = |i: usize| trace.world_from_tip[i].translation.vector;
         let on_board =
@@ -277,7 +277,7 @@ impl DwellTruth {
             motor_rad: mean_row(&trace.motor_rad[rows.clone()]),
             nominal_tip_base_m: nominal.into(),
             nominal_error_m: (nominal - mean_vector(rows.map(in_base))).norm(),
-            arrival: arrival(trace, first),
+            arrival: arrival_signs(trace, first),
             temperature_c: trace.temperature_c[first],
         }
     }
@@ -310,7 +310,7 @@ impl From<&Pose> for PoseTruth {
 }
 
 /// The first step of a rest from which on the tip stays where it ends up.
-fn settled(trace: &Trace, rest: &Rest) -> usize {
+fn first_still_step(trace: &Trace, rest: &Rest) -> usize {
     let tip = |i: usize| trace.world_from_tip[i].translation.vector;
     let half = rest.first + (rest.last - rest.first) / 2;
     let end = mean_vector((half..=rest.last).map(tip));
@@ -322,7 +322,7 @@ fn settled(trace: &Trace, rest: &Rest) -> usize {
 }
 
 /// Direction of the last motion of each link that was large enough to be one.
-fn arrival(trace: &Trace, first: usize) -> Vec<i8> {
+fn arrival_signs(trace: &Trace, first: usize) -> Vec<i8> {
     let rest = &trace.link_rad[first];
     (0..rest.len())
         .map(|j| {
@@ -343,7 +343,7 @@ fn mean_vector(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
     sum / n.max(1) as f64
 }
 
-pub(crate) fn deviations(nominal: &[DhRow], built: &[DhRow]) -> Vec<Deviation> {
+pub(crate) fn row_deviations(nominal: &[DhRow], built: &[DhRow]) -> Vec<Deviation> {
     let entries = |row: &DhRow| {
         [("theta", row.theta_rad()), ("d", row.d_m), ("a", row.a_m), ("alpha", row.alpha_rad())]
     };

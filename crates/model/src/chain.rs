@@ -3,7 +3,7 @@
 use crate::ModelError;
 use crate::arms::Arm;
 use crate::dh_toml::DhTable;
-use crate::error::nearest;
+use crate::error::most_similar;
 use crate::masses::Masses;
 use crate::segment::{Motion, Segment};
 use crate::tree::{SegmentId, Tree};
@@ -112,7 +112,7 @@ impl Chain {
         let end = self.segments.iter().position(named).map(|at| at + self.bases());
         end.ok_or_else(|| {
             let links = self.segments.iter().filter_map(|segment| segment.frame.as_deref());
-            ModelError::NoSuchLink { link: link.to_owned(), nearest: nearest(link, links) }
+            ModelError::NoSuchLink { link: link.to_owned(), nearest: most_similar(link, links) }
         })
     }
 

@@ -118,7 +118,7 @@ pub enum ModelError {
 }
 
 /// The candidate most similar to `name`, if any is similar at all.
-pub(crate) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<String> {
+pub(crate) fn most_similar<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<String> {
     candidates
         .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
         .filter(|(similarity, _)| *similarity > 0.7)
@@ -127,8 +127,8 @@ pub(crate) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>)
 }
 
 /// The end of a sentence about a name that is not among the candidates.
-pub(crate) fn hint<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> String {
-    did_you_mean(&nearest(name, candidates))
+pub(crate) fn similar_name_hint<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> String {
+    did_you_mean(&most_similar(name, candidates))
 }
 
 fn did_you_mean(nearest: &Option<String>) -> String {

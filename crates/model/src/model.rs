@@ -10,7 +10,7 @@ mod scopes;
 
 use crate::arms::{self, ArmFrames};
 use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
-use crate::error::nearest;
+use crate::error::most_similar;
 use crate::fixed::{FixedPlace, Length, Standing};
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
@@ -191,7 +191,7 @@ impl Model {
     /// world_from_board, such as the one the association found. Returns whether the recording has a board.
     pub fn set_board_start(&mut self, recording: usize, board_in_world: Pose) -> bool {
         let Some(board) = self.boards.get_mut(&recording) else { return false };
-        restart(board, &mut self.parameters, board_in_world);
+        set_start_pose(board, &mut self.parameters, board_in_world);
         self.refresh();
         true
     }
@@ -199,7 +199,7 @@ impl Model {
     /// Moves the start of the base frame of an arm (nominal value and centre of the prior) to another world_from_base, such as
     /// the one that brings the tips of two arms together. Effects that are placed already keep the old one.
     pub fn set_base_start(&mut self, arm: usize, base_in_world: Pose) {
-        restart(&mut self.tree.0[arm], &mut self.parameters, base_in_world);
+        set_start_pose(&mut self.tree.0[arm], &mut self.parameters, base_in_world);
         self.refresh();
     }
 
@@ -401,7 +401,7 @@ impl Model {
         if matching.is_empty() {
             return Err(ModelError::UnknownParameter {
                 name: name.to_owned(),
-                nearest: nearest(name, names()),
+                nearest: most_similar(name, names()),
             });
         }
         Ok(matching)
@@ -409,7 +409,7 @@ impl Model {
 }
 
 /// Lets a frame with six parameters start at another pose.
-fn restart(frame: &mut Segment, parameters: &mut [Parameter], pose: Pose) {
+fn set_start_pose(frame: &mut Segment, parameters: &mut [Parameter], pose: Pose) {
     if let Geometry::Origin { nominal, .. } = &mut frame.geometry {
         *nominal = Rigid::from(&pose);
     }

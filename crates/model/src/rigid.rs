@@ -20,7 +20,7 @@ impl<D: Scalar> Rigid<D> {
     /// First `self`, then `next` in the frame that `self` leads to.
     pub fn then(&self, next: &Rigid<D>) -> Rigid<D> {
         Rigid {
-            rotation: product(&self.rotation, &next.rotation),
+            rotation: matrix_product(&self.rotation, &next.rotation),
             translation_m: self.rotation * next.translation_m + self.translation_m,
         }
     }
@@ -58,7 +58,7 @@ impl From<&Rigid<f64>> for Pose {
 }
 
 /// The product of two 3x3 matrices, written out: nalgebra's general product costs dual numbers twice as much.
-pub(crate) fn product<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<D>) -> Matrix3<D> {
+pub(crate) fn matrix_product<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<D>) -> Matrix3<D> {
     Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
 }
 

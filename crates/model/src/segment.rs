@@ -3,7 +3,7 @@
 //! This is the only place where kinematic formulas stand. They are generic over the scalar, so the
 //! derivative of a segment with respect to each of its parameters comes from the same lines that predict.
 
-use crate::rigid::{Rigid, Scalar, product, rotation_of_vector};
+use crate::rigid::{Rigid, Scalar, matrix_product, rotation_of_vector};
 use crate::still::{Still, StillMoving};
 use crate::twist::Twists;
 use nalgebra::{Matrix3, Vector3};
@@ -203,7 +203,7 @@ impl Segment {
                 Parts { before: Some(modified_dh(o, o, own[2], own[3])), behind }
             }
             Geometry::Origin { nominal, freedom } => {
-                Parts { before: None, behind: origin(nominal, *freedom, own) }
+                Parts { before: None, behind: origin_transform(nominal, *freedom, own) }
             }
             Geometry::Axis(_) => Parts { before: None, behind: Rigid::identity() },
         }
@@ -249,9 +249,9 @@ fn with_beta<D: Scalar>(row: Rigid<D>, own: &[D], hayati: bool) -> Rigid<D> {
 }
 
 /// `T(x, y, z) R_nominal Exp(rx, ry, rz)`, as far as these are parameters; of a plane `T_nominal Tz(z) Exp(rx, ry, 0)`.
-fn origin<D: Scalar>(nominal: &Rigid<f64>, freedom: Freedom, own: &[D]) -> Rigid<D> {
+fn origin_transform<D: Scalar>(nominal: &Rigid<f64>, freedom: Freedom, own: &[D]) -> Rigid<D> {
     let rotation = nominal.rotation.map(D::from);
-    let turned = |rx, ry, rz| product(&rotation, &rotation_of_vector(&Vector3::new(rx, ry, rz)));
+    let turned = |rx, ry, rz| matrix_product(&rotation, &rotation_of_vector(&Vector3::new(rx, ry, rz)));
     match (own, freedom) {
         (&[x, y, z, rx, ry, rz], _) => {
             Rigid { rotation: turned(rx, ry, rz), translation_m: Vector3::new(x, y, z) }
@@ -267,7 +267,7 @@ fn origin<D: Scalar>(nominal: &Rigid<f64>, freedom: Freedom, own: &[D]) -> Rigid
 }
 
 /// About or along an axis of length one: Rodrigues' formula.
-pub(crate) fn moved(axis: &Vector3<f64>, q: f64, motion: Motion) -> Rigid<f64> {
+pub(crate) fn joint_transform(axis: &Vector3<f64>, q: f64, motion: Motion) -> Rigid<f64> {
     match motion {
         Motion::Prismatic => Rigid { translation_m: axis * q, ..Rigid::identity() },
         Motion::Revolute => {

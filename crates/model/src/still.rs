@@ -5,7 +5,7 @@
 //! by the definition of a twist (Lynch and Park, Modern Robotics, 2017, section 4.1).
 
 use crate::rigid::Rigid;
-use crate::segment::{Joint, LinearisedSegment, MAX_PARAMETERS, Motion, Parts, Segment, moved};
+use crate::segment::{Joint, LinearisedSegment, MAX_PARAMETERS, Motion, Parts, Segment, joint_transform};
 use crate::twist::{Twist, Twists};
 use nalgebra::{SVector, Vector3};
 use num_dual::DualSVec64;
@@ -59,7 +59,7 @@ impl Still {
     fn motion(&self, joints: &[f64]) -> Option<Rigid<f64>> {
         let (joint, axis) = self.joint.as_ref()?;
         let reading = joints.get(joint.index).copied().unwrap_or(f64::NAN);
-        Some(moved(axis, joint.at(reading), joint.motion))
+        Some(joint_transform(axis, joint.at(reading), joint.motion))
     }
 
     /// Motion of its end per unit of its joint's reading, in axes of its start; `end_m` is where that end is.
@@ -86,8 +86,8 @@ impl StillMoving {
         let Parts { before, behind } = segment.parts(&lanes[..own.len()]);
         // A segment that no joint moves is one part.
         let (before, behind) = match segment.joint {
-            Some(_) => (before.as_ref().map(motions), motions(&behind)),
-            None => (None, motions(&Parts { before, behind }.whole())),
+            Some(_) => (before.as_ref().map(part_twists), part_twists(&behind)),
+            None => (None, part_twists(&Parts { before, behind }.whole())),
         };
         StillMoving { still: Still::of(segment, p), parameters: own.len(), before, behind }
     }
@@ -126,18 +126,21 @@ impl StillMoving {
 }
 
 /// Motions of the end of a constant part, in axes of its start.
-fn motions(part: &Rigid<Lanes>) -> Twists<MAX_PARAMETERS> {
+fn part_twists(part: &Rigid<Lanes>) -> Twists<MAX_PARAMETERS> {
     // Of dR R' = [w]x, the entry below the diagonal for each axis.
     let rate = |i: usize, j: usize| {
-        let term = |k: usize| lanes(&part.rotation[(i, k)]) * part.rotation[(j, k)].re;
+        let term = |k: usize| entry_derivatives(&part.rotation[(i, k)]) * part.rotation[(j, k)].re;
         term(0) + term(1) + term(2)
     };
     let rotation_rad = [rate(2, 1), rate(0, 2), rate(1, 0)];
-    Twists { translation_m: array::from_fn(|axis| lanes(&part.translation_m[axis])), rotation_rad }
+    Twists {
+        translation_m: array::from_fn(|axis| entry_derivatives(&part.translation_m[axis])),
+        rotation_rad,
+    }
 }
 
 /// The derivatives of an entry; one that depends on nothing has none.
-fn lanes(entry: &Lanes) -> SVector<f64, MAX_PARAMETERS> {
+fn entry_derivatives(entry: &Lanes) -> SVector<f64, MAX_PARAMETERS> {
     entry.eps.0.unwrap_or_default()
 }
 

@@ -1,6 +1,6 @@
 //! From recordings to a calibration whose setup was looked at, and what a report needs of it.
 
-use crate::diagnosed::{diagnosis, set_diagnosis};
+use crate::diagnosed::{run_diagnosis, set_diagnosis};
 use crate::refits::sized_by_refits;
 use armcal_calibrate::Calibration;
 use armcal_config::Pipeline;
@@ -49,7 +49,7 @@ pub fn settle_again(
     let (model_texts, chain) = frames::nominal_chain(pipeline)?;
     // What `[diagnosis]` says of the effects of the arm is understood before hours of work.
     Knowledge::of(&pipeline.diagnosis, chain.joint_names())?;
-    let board = frames::board(pipeline)?;
+    let board = frames::read_board(pipeline)?;
     let recordings = preprocess::open_all(pipeline, progress)?;
     let seen = preprocess::dwells_of_all(pipeline, &chain, &recordings, progress, &mut drop)?;
     let fingerprints: Vec<_> = seen.iter().map(|s| (s.name.as_str(), s.fingerprint.as_ref())).collect();
@@ -76,16 +76,16 @@ pub fn settle_again(
     let concluded = concluded.filter(|earlier| earlier.are_of(&grounds));
     let setup = match &concluded {
         Some(earlier) => earlier.setup.clone(),
-        None => examined(pipeline, &inputs, &fitted, progress),
+        None => examine_setup(pipeline, &inputs, &fitted, progress),
     };
     Ok(Converged { recordings, model_texts, inputs, setup, fitted, concluded })
 }
 
 /// What contradicts the data about the setup, and leaves less of the errors than any effect that has a name.
-fn examined(pipeline: &Pipeline, inputs: &Inputs, fitted: &Fitted, progress: &dyn Steps) -> SetupReport {
+fn examine_setup(pipeline: &Pipeline, inputs: &Inputs, fitted: &Fitted, progress: &dyn Steps) -> SetupReport {
     let mut setup = setup::examine(inputs, fitted);
     if setup.may_give_way()
-        && let Ok(physics) = diagnosis(pipeline, &fitted.calibrated(pipeline), progress)
+        && let Ok(physics) = run_diagnosis(pipeline, &fitted.calibrated(pipeline), progress)
     {
         give_way(&mut setup, physics.as_ref());
     }
@@ -142,7 +142,7 @@ impl Converged {
         let calibrated = self.fitted.calibrated(pipeline);
         match &self.concluded {
             Some(earlier) => Ok(Some(earlier.diagnosis_of(&calibrated))),
-            None => diagnosis(pipeline, &calibrated, progress),
+            None => run_diagnosis(pipeline, &calibrated, progress),
         }
     }
 
@@ -197,7 +197,7 @@ pub(crate) fn run_of(
     (observations, session): (Vec<Observation>, Session),
     calibration: Calibration,
 ) -> Run {
-    let ties = frames::ties(pipeline, &model);
+    let ties = frames::effect_ties(pipeline, &model);
     Run {
         pipeline_name: pipeline.name.clone(),
         pipeline_text: pipeline.text.clone(),

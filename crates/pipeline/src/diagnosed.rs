@@ -2,7 +2,7 @@
 
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_diagnose::{Calibrated, Diagnosis, Nested, diagnose, nested};
+use armcal_diagnose::{Calibrated, Diagnosis, Nested, diagnose, nested_validation};
 use armcal_result::{Run, Undiagnosed};
 use armcal_stages::{RunError, Steps};
 
@@ -11,18 +11,18 @@ pub(crate) const DIAGNOSIS_FAILED: &str = "diagnosis-failed";
 
 /// Looks for the effect that the model of a run is missing, if the pipeline wants to know.
 pub(crate) fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) {
-    let found = diagnosis(pipeline, &calibrated(run, pipeline), progress);
+    let found = run_diagnosis(pipeline, &diagnosis_input(run, pipeline), progress);
     set_diagnosis(run, found);
 }
 
 /// What a diagnosis asks of a run.
-pub(crate) fn calibrated<'a>(run: &'a Run, pipeline: &'a Pipeline) -> Calibrated<'a> {
+pub(crate) fn diagnosis_input<'a>(run: &'a Run, pipeline: &'a Pipeline) -> Calibrated<'a> {
     let Run { model, calibration, observations, session, .. } = run;
     let (fit, holdout) = (&pipeline.fit, &pipeline.holdout);
     Calibrated { model, calibration, observations, session, fit, holdout }
 }
 
-pub(crate) fn diagnosis(
+pub(crate) fn run_diagnosis(
     pipeline: &Pipeline,
     calibrated: &Calibrated<'_>,
     progress: &dyn Steps,
@@ -60,5 +60,5 @@ pub fn chosen_again(
         return Ok(found.nested.clone());
     }
     progress.step("choosing again without each part of the hold-out");
-    Ok(nested(calibrated, found, &pipeline.diagnosis)?)
+    Ok(nested_validation(calibrated, found, &pipeline.diagnosis)?)
 }

@@ -1,6 +1,6 @@
 //! What the model of a run would become: with what the diagnosis found, and with each of the best candidates.
 
-use crate::diagnosed::{calibrated, chosen_again};
+use crate::diagnosed::{chosen_again, diagnosis_input};
 use armcal_calibrate::{calibrate_beside, holdout_turns};
 use armcal_config::Pipeline;
 use armcal_core::{Severity, Stage, Warning};
@@ -24,7 +24,7 @@ const CHOSEN_AGAIN_PARTS: usize = 3;
 pub fn add_refits(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) -> Result<(), RunError> {
     (run.steps, run.alternatives) = Default::default();
     let Some(mut diagnosis) = run.diagnosis.take() else { return Ok(()) };
-    let calibrated = calibrated(run, pipeline);
+    let calibrated = diagnosis_input(run, pipeline);
     let Refits { steps, alternatives, warnings } = sized_by_refits(&mut diagnosis, &calibrated, progress)?;
     if !steps.is_empty() {
         choose_again(&mut diagnosis, pipeline, (&calibrated, run.is_pool()), progress);
@@ -48,9 +48,9 @@ pub(crate) fn sized_by_refits(
     calibrated: &Calibrated<'_>,
     progress: &dyn Steps,
 ) -> Result<Refits, RunError> {
-    let (steps, warnings) = steps(diagnosis, calibrated, progress)?;
+    let (steps, warnings) = cumulative_refits(diagnosis, calibrated, progress)?;
     progress.step("fitting the best candidates");
-    let alternatives = alternatives(diagnosis, calibrated, &steps);
+    let alternatives = alternative_refits(diagnosis, calibrated, &steps);
     let estimate = |refit: &Refit, name: &str| {
         let estimates = &refit.calibration.fit.estimates;
         estimates.iter().find(|e| e.parameter.name == name).map(|e| (e.value, e.ci95))
@@ -106,7 +106,7 @@ fn choose_again(
 
 /// The model with what the diagnosis found, each time fitted anew: one named effect after the other, then all that has no name at
 /// once.
-fn steps(
+fn cumulative_refits(
     diagnosis: &Diagnosis,
     calibrated: &Calibrated<'_>,
     progress: &dyn Steps,
@@ -125,7 +125,7 @@ fn steps(
                 model: r.model.clone(),
                 calibration: r.calibration.clone(),
             }),
-            None => refit(calibrated, &found[..count]),
+            None => refit_with_effects(calibrated, &found[..count]),
         };
         match step {
             Ok(step) => steps.push(step),
@@ -146,7 +146,7 @@ fn steps(
 /// The most probable candidates, each alone in the run's model; not those that are a step already.
 ///
 /// One that cannot be fitted on this hold-out has no refit; the ranking says what is known about it.
-fn alternatives(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>, steps: &[Refit]) -> Vec<Refit> {
+fn alternative_refits(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>, steps: &[Refit]) -> Vec<Refit> {
     let members = |spec: &str| -> Vec<String> { spec.split('+').map(str::to_owned).collect() };
     let best = diagnosis.candidates.iter().map(|c| members(&c.spec));
     let [most, fewest] = ALTERNATIVES;
@@ -156,13 +156,13 @@ fn alternatives(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>, steps: &[Ref
     let refit = |effects: &Vec<String>| {
         let specs =
             effects.iter().map(|spec| calibrated.model.effect(spec)).collect::<Result<Vec<_>, _>>().ok()?;
-        refit(calibrated, &specs).ok()
+        refit_with_effects(calibrated, &specs).ok()
     };
     wanted.par_iter().filter_map(refit).collect()
 }
 
 /// The calibrated model with more effects, on the same observations.
-fn refit(calibrated: &Calibrated<'_>, effects: &[EffectSpec]) -> Result<Refit, RunError> {
+fn refit_with_effects(calibrated: &Calibrated<'_>, effects: &[EffectSpec]) -> Result<Refit, RunError> {
     let Calibrated { model, calibration, observations, session, fit, holdout } = *calibrated;
     let model = model.with_effects(effects, session)?;
     let calibration = calibrate_beside(Some(calibration), &model, observations, fit, holdout)?;

@@ -34,7 +34,7 @@ pub fn recalibrate(
     if run.setup.mistakes().next().is_none() {
         diagnose_again(run, pipeline, progress);
     }
-    run.ties = frames::ties(pipeline, &run.model);
+    run.ties = frames::effect_ties(pipeline, &run.model);
     run.pipeline_name.clone_from(&pipeline.name);
     run.pipeline_text.clone_from(&pipeline.text);
     add_refits(run, pipeline, progress)

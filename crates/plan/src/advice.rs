@@ -4,7 +4,7 @@ use armcal_model::{EffectKind, Lookalikes, catalogue, find};
 
 /// The sensor or test that separates two effects, by their names: that of one of them, that of what both are lookalikes in, or
 /// what tells most things apart.
-pub fn sensor(a: &str, b: &str) -> &'static str {
+pub fn separating_sensor(a: &str, b: &str) -> &'static str {
     let kind = |name: &str| name.split([':', '@', ',']).next().and_then(find);
     let pair: Vec<&EffectKind> = [a, b].into_iter().filter_map(kind).collect();
     // In the order of the catalogue, so that it does not matter which of the two comes first.
@@ -37,7 +37,7 @@ const SEPARATED: [(Lookalikes, usize, &str); 6] = [
 
 #[cfg(test)]
 mod tests {
-    use super::sensor;
+    use super::separating_sensor;
 
     #[test]
     fn what_separates_two_effects_does_not_depend_on_their_order() {
@@ -52,8 +52,8 @@ mod tests {
             ("backlash:1", "compliance:2", "put a marker on the base or on a link"),
         ];
         for (a, b, by) in cases {
-            assert!(sensor(a, b).starts_with(by), "{a} and {b}: {}", sensor(a, b));
-            assert_eq!(sensor(a, b), sensor(b, a), "{a} and {b}");
+            assert!(separating_sensor(a, b).starts_with(by), "{a} and {b}: {}", separating_sensor(a, b));
+            assert_eq!(separating_sensor(a, b), separating_sensor(b, a), "{a} and {b}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The greedy choice, and what it promises in words.
 
-use super::advice::sensor;
-use super::discrimination::{Geometry, PoolDwell, Survivor, apart, plan};
-use super::pool::{Possible, pool};
+use super::advice::separating_sensor;
+use super::discrimination::{Geometry, PoolDwell, Survivor, choose_dwells, pair_delta};
+use super::pool::{Possible, candidate_dwells};
 use super::reach::Limits;
 use super::rivals::{Rival, Standing};
 use super::{Allowed, Known, Pair, Proposal, Proposed};
@@ -54,14 +54,14 @@ pub fn propose(
     for (a, b) in &choice.stuck {
         let names = [name(a), name(b)];
         let [before, after] = [&[][..], &choice.dwells].map(|dwells| weighed.apart(*a, *b, dwells));
-        let sensor = Some(sensor(&names[0], &names[1]).to_owned());
+        let sensor = Some(separating_sensor(&names[0], &names[1]).to_owned());
         pairs.push(Pair { names, delta_before: before, delta_after: after, sensor });
     }
     Ok(Proposal {
         explanations: choice.kept.iter().map(name).collect(),
         why: standing.why.clone(),
-        dwells: dwells.map(|(i, d)| proposed(&weighed.pool[*i], *d)).collect(),
-        sentence: sentence(&pairs, &deltas, config),
+        dwells: dwells.map(|(i, d)| proposed_dwell(&weighed.pool[*i], *d)).collect(),
+        sentence: summary_sentence(&pairs, &deltas, config),
         pairs,
         assumptions: assumptions(known, allowed),
         range_deg: limits.0.iter().map(|range| range.map(f64::to_degrees)).collect(),
@@ -92,7 +92,7 @@ impl Weighed {
         allowed: &Allowed,
     ) -> Result<Weighed, RunError> {
         let specs: Vec<EffectSpec> = standing.rivals.iter().map(|r| r.spec.clone()).collect();
-        let pool = pool(known, limits, allowed, &specs);
+        let pool = candidate_dwells(known, limits, allowed, &specs);
         let possible: Vec<Observation> = pool.iter().map(|p| p.observation.clone()).collect();
         let load = known.session.load || possible.iter().any(|o| o.load_kg != 0.0);
         let full = known.model.with_effects(&specs, &Session { load, ..known.session.clone() })?;
@@ -108,7 +108,7 @@ impl Weighed {
             .collect();
         let mut survivors: Vec<Survivor> = (0..effects.len())
             .map(|k| {
-                let size = |c: &usize| size(&full, data.axes[*c].index, &standing.rivals[k]);
+                let size = |c: &usize| relative_amplitude(&full, data.axes[*c].index, &standing.rivals[k]);
                 Survivor {
                     name: specs[k].to_string(),
                     columns: -data.jacobian.select_columns(&columns[k]),
@@ -204,7 +204,7 @@ impl Weighed {
             effects: kept.iter().map(|k| self.dwells[*i].effects[*k].clone()).collect(),
         };
         let dwells: Vec<PoolDwell> = open.iter().map(dwell).collect();
-        let plan = plan(&self.geometry, &survivors, &dwells, count);
+        let plan = choose_dwells(&self.geometry, &survivors, &dwells, count);
         let mut chosen: Vec<usize> = Vec::new();
         for i in plan.chosen.iter().map(|i| open[*i]) {
             if !chosen.contains(&i) {
@@ -223,18 +223,18 @@ impl Weighed {
     /// Delta of a pair with these dwells.
     fn apart(&self, a: usize, b: usize, dwells: &[usize]) -> f64 {
         let dwells: Vec<&PoolDwell> = dwells.iter().map(|i| &self.dwells[*i]).collect();
-        apart(&self.geometry, &self.survivors, &dwells, (a, b))
+        pair_delta(&self.geometry, &self.survivors, &dwells, (a, b))
     }
 }
 
 /// Size of an amplitude in typical sizes: what the data ask for, else typical.
-fn size(model: &Model, parameter: usize, rival: &Rival) -> f64 {
+fn relative_amplitude(model: &Model, parameter: usize, rival: &Rival) -> f64 {
     let name = &model.parameters()[parameter].name;
     let quantity = name.strip_prefix(&format!("{}.", rival.spec)).unwrap_or(name);
     rival.sizes.iter().find(|(known, _)| known == quantity).map_or(1.0, |(_, size)| *size)
 }
 
-fn proposed(possible: &Possible, delta: f64) -> Proposed {
+fn proposed_dwell(possible: &Possible, delta: f64) -> Proposed {
     let o = &possible.observation;
     Proposed {
         place: possible.place.clone(),
@@ -245,7 +245,7 @@ fn proposed(possible: &Possible, delta: f64) -> Proposed {
     }
 }
 
-fn sentence(pairs: &[Pair], deltas: &[f64], config: &DiagnosisConfig) -> String {
+fn summary_sentence(pairs: &[Pair], deltas: &[f64], config: &DiagnosisConfig) -> String {
     let mut advice: Vec<(&str, Vec<String>)> = Vec::new();
     for pair in pairs {
         let Some(sensor) = pair.sensor.as_deref() else { continue };

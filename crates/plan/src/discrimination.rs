@@ -64,7 +64,7 @@ pub struct Plan {
 }
 
 /// Proposes up to `count` dwells of a pool.
-pub fn plan(geometry: &Geometry, survivors: &[Survivor], pool: &[PoolDwell], count: usize) -> Plan {
+pub fn choose_dwells(geometry: &Geometry, survivors: &[Survivor], pool: &[PoolDwell], count: usize) -> Plan {
     let mut rivalries = Vec::new();
     for k in 0..survivors.len() {
         for l in (0..survivors.len()).filter(|l| *l != k && !survivors[k].theta.is_empty()) {
@@ -95,7 +95,7 @@ pub fn plan(geometry: &Geometry, survivors: &[Survivor], pool: &[PoolDwell], cou
 
 /// Delta of a pair with some dwells of the pool beside the data, the smaller of both directions that there are; infinite
 /// where there is none.
-pub fn apart(
+pub fn pair_delta(
     geometry: &Geometry,
     survivors: &[Survivor],
     dwells: &[&PoolDwell],
@@ -104,12 +104,12 @@ pub fn apart(
     [(a, b), (b, a)]
         .into_iter()
         .filter(|(true_one, _)| !survivors[*true_one].theta.is_empty())
-        .map(|(true_one, rival)| delta(geometry, survivors, dwells, true_one, rival))
+        .map(|(true_one, rival)| one_way_delta(geometry, survivors, dwells, true_one, rival))
         .fold(f64::INFINITY, f64::min)
 }
 
 /// `|(I - P) G theta|^2`: what the rival and the geometry leave of the true one's signature.
-fn delta(
+fn one_way_delta(
     geometry: &Geometry,
     survivors: &[Survivor],
     dwells: &[&PoolDwell],
@@ -123,7 +123,7 @@ fn delta(
     }
     let (mut b, mut c) = (DVector::zeros(size), 0.0);
     let mut add = |geometry: &DMatrix<f64>, own: &DMatrix<f64>, other: &DMatrix<f64>| {
-        let x = joined(geometry, other);
+        let x = join_columns(geometry, other);
         let signature = own * &survivors[true_one].theta;
         a += x.tr_mul(&x);
         b += x.tr_mul(&signature);
@@ -157,7 +157,7 @@ struct Rivalry {
 
 impl Rivalry {
     fn new(geometry: &Geometry, survivors: &[Survivor], k: usize, l: usize) -> Rivalry {
-        let x = joined(&geometry.columns, &survivors[l].columns);
+        let x = join_columns(&geometry.columns, &survivors[l].columns);
         let signature = &survivors[k].columns * &survivors[k].theta;
         let mut a = x.tr_mul(&x);
         for j in 0..a.nrows() {
@@ -177,7 +177,7 @@ impl Rivalry {
         dwell: &PoolDwell,
         survivors: &[Survivor],
     ) -> Option<(DMatrix<f64>, DVector<f64>, DMatrix<f64>)> {
-        let x = joined(&dwell.geometry, &dwell.effects[self.l]);
+        let x = join_columns(&dwell.geometry, &dwell.effects[self.l]);
         let v = &dwell.effects[self.k] * &survivors[self.k].theta - &x * &self.beta;
         let s = DMatrix::identity(v.len(), v.len()) + &x * &self.inverse * x.transpose();
         Some((x, v, s.try_inverse()?))
@@ -198,7 +198,7 @@ impl Rivalry {
 }
 
 /// Columns side by side.
-fn joined(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+fn join_columns(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(a.nrows(), a.ncols() + b.ncols());
     all.columns_mut(0, a.ncols()).copy_from(a);
     all.columns_mut(a.ncols(), b.ncols()).copy_from(b);

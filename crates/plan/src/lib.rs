@@ -13,7 +13,7 @@ mod rivals;
 
 pub use choose::propose;
 pub use pool::Place;
-pub use rivals::{Standing, named, standing};
+pub use rivals::{Standing, rivals_from_diagnosis, rivals_from_names};
 
 use armcal_calibrate::FitConfig;
 use armcal_core::{Arrival, Observation};

@@ -1,6 +1,6 @@
 //! Every dwell the rig could do next, as the observation it would become.
 
-use super::reach::{Limits, close, joint_step, nearest, solve};
+use super::reach::{Limits, joint_step, nearest_dwell, solve_closure, solve_position};
 use super::{Allowed, Known, Tracking};
 use armcal_core::{Arrival, DwellId, Observation, Reference};
 use armcal_model::EffectSpec;
@@ -63,17 +63,22 @@ pub struct Possible {
 }
 
 /// All of them. With an event among the rivals only the board as it stands now.
-pub fn pool(known: &Known<'_>, limits: &Limits, allowed: &Allowed, rivals: &[EffectSpec]) -> Vec<Possible> {
+pub fn candidate_dwells(
+    known: &Known<'_>,
+    limits: &Limits,
+    allowed: &Allowed,
+    rivals: &[EffectSpec],
+) -> Vec<Possible> {
     let mut loads_kg: Vec<f64> =
         known.observations.iter().map(|o| o.load_kg).chain(allowed.loads_kg.clone()).collect();
     loads_kg.sort_by(f64::total_cmp);
     loads_kg.dedup();
     let event = rivals.iter().any(|r| r.since.is_some());
-    let mut places = seated(known, limits, event);
+    let mut places = seated_candidates(known, limits, event);
     let step = (places.len() * loads_kg.len()).div_ceil(MOST_SEATED).max(1);
     places = places.into_iter().step_by(step).collect();
-    places.extend(joined(known, limits));
-    places.extend(known.tracked.iter().flat_map(|tracking| free(known, limits, tracking)));
+    places.extend(joined_candidates(known, limits));
+    places.extend(known.tracked.iter().flat_map(|tracking| free_candidates(known, limits, tracking)));
     let mut pool = Vec::new();
     for load_kg in loads_kg {
         for possible in &places {
@@ -87,7 +92,7 @@ pub fn pool(known: &Known<'_>, limits: &Limits, allowed: &Allowed, rivals: &[Eff
 }
 
 /// Every cavity at every tilt, entered from every side that makes a difference.
-fn seated(known: &Known<'_>, limits: &Limits, last_only: bool) -> Vec<Possible> {
+fn seated_candidates(known: &Known<'_>, limits: &Limits, last_only: bool) -> Vec<Possible> {
     let Some(board) = known.board else { return Vec::new() };
     let last = known.session.recordings.saturating_sub(1);
     let mut all = Vec::new();
@@ -95,11 +100,12 @@ fn seated(known: &Known<'_>, limits: &Limits, last_only: bool) -> Vec<Possible> 
         let Some(pose) = known.model.board_in_world(&known.values, recording) else { continue };
         for cavity in &board.cavities {
             let target_m = (pose * Point3::from(cavity.in_board_m)).coords;
-            let Some(from) = nearest(known, &target_m) else { continue };
-            let Some(joint_rad) = solve(known, from, &target_m).filter(|q| limits.hold(q, 0.0)) else {
+            let Some(from) = nearest_dwell(known, &target_m) else { continue };
+            let Some(joint_rad) = solve_position(known, from, &target_m).filter(|q| limits.hold(q, 0.0))
+            else {
                 continue;
             };
-            let mut at = later(known, from, recording, joint_rad);
+            let mut at = later_dwell(known, from, recording, joint_rad);
             let in_board_m = cavity.in_board_m;
             at.reference = Reference::Seated { cavity: cavity.name.clone(), in_board_m };
             at.covariance_m2 = board.seat_covariance_m2();
@@ -115,7 +121,7 @@ fn seated(known: &Known<'_>, limits: &Limits, last_only: bool) -> Vec<Possible> 
                 known_sides.push(arrival.clone());
                 let recording = known.recordings.get(recording).cloned().unwrap_or_default();
                 let place = Place::Cavity { cavity: cavity.name.clone(), recording, slide_from_deg };
-                all.push(Possible { place, observation: arriving(&at, arrival) });
+                all.push(Possible { place, observation: with_arrival(&at, arrival) });
             }
         }
     }
@@ -131,7 +137,7 @@ fn way_in(slide_from_deg: Option<f64>) -> Vector3<f64> {
 }
 
 /// Free poses spread over the joint ranges (Halton points), and the recorded ones again, from every side.
-fn free(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible> {
+fn free_candidates(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible> {
     let last = known.session.recordings.saturating_sub(1);
     let keep = Clearance::of(known);
     let mut poses: Vec<(Place, Vec<f64>)> = Vec::new();
@@ -153,12 +159,12 @@ fn free(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible
     let mut all = Vec::new();
     for (i, (place, joint_rad)) in poses.into_iter().enumerate() {
         let Some(from) = known.observations.iter().min_by(|a, b| {
-            let way = |o: &Observation| apart(&o.joint_rad, &joint_rad);
+            let way = |o: &Observation| largest_difference_rad(&o.joint_rad, &joint_rad);
             way(a).total_cmp(&way(b))
         }) else {
             continue;
         };
-        let mut at = later(known, from, last, joint_rad);
+        let mut at = later_dwell(known, from, last, joint_rad);
         let tip =
             known.model.base_in_world(&known.values) * known.model.tip_in_base(&known.values, &at.joint_rad);
         at.reference = Reference::Tracked {
@@ -167,8 +173,8 @@ fn free(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible
             orientation_sigma_rad: tracking.orientation_sigma_rad.unwrap_or(0.0),
         };
         at.covariance_m2 = tracking.covariance_m2;
-        for arrival in sides(at.joint_rad.len(), i) {
-            all.push(Possible { place: place.clone(), observation: arriving(&at, arrival) });
+        for arrival in arrival_sides(at.joint_rad.len(), i) {
+            all.push(Possible { place: place.clone(), observation: with_arrival(&at, arrival) });
         }
     }
     all
@@ -176,27 +182,27 @@ fn free(known: &Known<'_>, limits: &Limits, tracking: &Tracking) -> Vec<Possible
 
 /// Poses of both arms spread over the joint ranges (Halton points), from each of which the tips are brought together, from every
 /// side.
-fn joined(known: &Known<'_>, limits: &Limits) -> Vec<Possible> {
+fn joined_candidates(known: &Known<'_>, limits: &Limits) -> Vec<Possible> {
     let last = known.session.recordings.saturating_sub(1);
     let Some(like) = known.observations.iter().rfind(|o| o.against().is_some()) else { return Vec::new() };
     let clear = AWAY_RAD / 2.0;
     let closed = |draw: usize| {
-        let from = later(known, like, last, limits.drawn(draw, AWAY_RAD));
-        close(known, &from).filter(|q| limits.hold(q, clear))
+        let from = later_dwell(known, like, last, limits.drawn(draw, AWAY_RAD));
+        solve_closure(known, &from).filter(|q| limits.hold(q, clear))
     };
     let mut all = Vec::new();
     for (pose, joint_rad) in (1..=DRAWS).filter_map(closed).take(2 * POSES).enumerate() {
-        let at = later(known, like, last, joint_rad);
-        let sides = sides(at.joint_rad.len(), pose).into_iter();
+        let at = later_dwell(known, like, last, joint_rad);
+        let sides = arrival_sides(at.joint_rad.len(), pose).into_iter();
         all.extend(
-            sides.map(|arrival| Possible { place: Place::Joined, observation: arriving(&at, arrival) }),
+            sides.map(|arrival| Possible { place: Place::Joined, observation: with_arrival(&at, arrival) }),
         );
     }
     all
 }
 
 /// Sides from which the joints arrive: all combinations of up to three joints, four of more.
-fn sides(joints: usize, pose: usize) -> Vec<Vec<Arrival>> {
+fn arrival_sides(joints: usize, pose: usize) -> Vec<Vec<Arrival>> {
     let sign = |up: bool| if up { Arrival::Positive } else { Arrival::Negative };
     if joints <= 3 {
         return (0..1usize << joints)
@@ -260,7 +266,7 @@ impl Clearance {
 }
 
 /// A dwell like a recorded one, later, at other joint readings.
-fn later(known: &Known<'_>, like: &Observation, recording: usize, joint_rad: Vec<f64>) -> Observation {
+fn later_dwell(known: &Known<'_>, like: &Observation, recording: usize, joint_rad: Vec<f64>) -> Observation {
     let dwells = known.observations.iter().filter(|o| o.dwell.recording == recording);
     let dwell = dwells.map(|o| o.dwell.dwell + 1).max().unwrap_or(0);
     let newest = known.observations.iter().max_by_key(|o| o.time_ns);
@@ -275,7 +281,7 @@ fn later(known: &Known<'_>, like: &Observation, recording: usize, joint_rad: Vec
     }
 }
 
-fn arriving(at: &Observation, arrival: Vec<Arrival>) -> Observation {
+fn with_arrival(at: &Observation, arrival: Vec<Arrival>) -> Observation {
     let memory = |(q, side): (&f64, &Arrival)| match side {
         Arrival::Unknown => Vec::new(),
         _ => vec![q - side.sign() * AWAY_RAD, *q],
@@ -293,7 +299,7 @@ fn side_of(turn_rad: f64) -> Arrival {
     }
 }
 
-fn apart(a: &[f64], b: &[f64]) -> f64 {
+fn largest_difference_rad(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
@@ -303,10 +309,10 @@ mod tests {
 
     #[test]
     fn three_joints_arrive_from_all_sides_and_seven_from_mixed_ones() {
-        let three = sides(3, 0);
+        let three = arrival_sides(3, 0);
         assert_eq!(three.len(), 8);
         for (j, k) in (0..7).flat_map(|j| (0..j).map(move |k| (j, k))) {
-            let apart = (0..POSES).flat_map(|pose| sides(7, pose)).any(|s| s[j] != s[k]);
+            let apart = (0..POSES).flat_map(|pose| arrival_sides(7, pose)).any(|s| s[j] != s[k]);
             assert!(apart, "joints {j} and {k} always arrive from the same side");
         }
     }

@@ -39,7 +39,7 @@ impl Limits {
     pub fn drawn(&self, draw: usize, away_rad: f64) -> Vec<f64> {
         let inner = |(joint, [low, high]): (usize, &[f64; 2])| {
             let away = away_rad.min((high - low) / 4.0);
-            low + away + radical_inverse(draw, prime(joint)) * (high - low - 2.0 * away)
+            low + away + radical_inverse(draw, nth_prime(joint)) * (high - low - 2.0 * away)
         };
         self.0.iter().enumerate().map(inner).collect()
     }
@@ -51,15 +51,15 @@ impl Limits {
 }
 
 /// The dwell whose tip is nearest to a point in the world.
-pub fn nearest<'a>(known: &Known<'a>, target_m: &Vector3<f64>) -> Option<&'a Observation> {
+pub fn nearest_dwell<'a>(known: &Known<'a>, target_m: &Vector3<f64>) -> Option<&'a Observation> {
     let distance = |o: &Observation| (known.model.predicted_tip_in_world(&known.values, o) - target_m).norm();
     known.observations.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// Joint readings that bring the tip of the fitted model to a point in the world, the nearest to where `from` has them
 /// (damped least squares: Wampler 1986). `None` where the arm does not get there.
-pub fn solve(known: &Known<'_>, from: &Observation, target_m: &Vector3<f64>) -> Option<Vec<f64>> {
-    brought(known, from, |at| target_m - known.model.predicted_tip_in_world(&known.values, at))
+pub fn solve_position(known: &Known<'_>, from: &Observation, target_m: &Vector3<f64>) -> Option<Vec<f64>> {
+    inverse_kinematics(known, from, |at| target_m - known.model.predicted_tip_in_world(&known.values, at))
 }
 
 /// The smallest change of the joints [rad] that moves the tip by `way_m` in the world.
@@ -73,12 +73,12 @@ pub fn joint_step(known: &Known<'_>, at: &Observation, way_m: &Vector3<f64>) -> 
 
 /// Joint readings of both arms that bring their tips together, or as far apart as their link is, near where `from` has them;
 /// `None` where they do not meet.
-pub fn close(known: &Known<'_>, from: &Observation) -> Option<Vec<f64>> {
-    brought(known, from, |at| known.model.residual(&known.values, at).position_m)
+pub fn solve_closure(known: &Known<'_>, from: &Observation) -> Option<Vec<f64>> {
+    inverse_kinematics(known, from, |at| known.model.residual(&known.values, at).position_m)
 }
 
 /// Joint readings from which nothing of the way that `left_m` tells is left, the nearest to where `from` has them.
-fn brought(
+fn inverse_kinematics(
     known: &Known<'_>,
     from: &Observation,
     left_m: impl Fn(&Observation) -> Vector3<f64>,
@@ -107,7 +107,7 @@ fn radical_inverse(mut n: usize, base: usize) -> f64 {
     value
 }
 
-fn prime(index: usize) -> usize {
+fn nth_prime(index: usize) -> usize {
     let is_prime = |n: &usize| (2..*n).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
     (2..).filter(is_prime).nth(index).unwrap_or(2)
 }
@@ -120,10 +120,10 @@ mod tests {
     fn halton_points_fill_every_box_once() {
         let mut seen = [false; 36];
         for n in 0..36 {
-            let [x, y] = [0, 1].map(|axis| radical_inverse(n, prime(axis)));
+            let [x, y] = [0, 1].map(|axis| radical_inverse(n, nth_prime(axis)));
             seen[(x * 4.0 + 1e-9) as usize * 9 + (y * 9.0 + 1e-9) as usize] = true;
         }
         assert!(seen.iter().all(|s| *s));
-        assert_eq!([0, 1, 2, 3, 4].map(prime), [2, 3, 5, 7, 11]);
+        assert_eq!([0, 1, 2, 3, 4].map(nth_prime), [2, 3, 5, 7, 11]);
     }
 }

@@ -31,7 +31,7 @@ pub struct Standing {
 
 /// What a diagnosis leaves standing: the first ambiguous set; the unlisted shape against the best names; otherwise the
 /// effects that could not be tested, against nothing.
-pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, RunError> {
+pub fn rivals_from_diagnosis(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, RunError> {
     let parse = |name: &String| EffectSpec::parse(name, joints).map_err(RunError::Model);
     let open = diagnosis.effects.iter().position(|e| e.set.len() > 1);
     let mut certain = Vec::new();
@@ -40,9 +40,9 @@ pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Ru
     }
     if let Some(found) = open.and_then(|i| diagnosis.effects.get(i)) {
         let mut rivals =
-            found.set.iter().map(|n| rival(diagnosis, n, joints)).collect::<Result<Vec<_>, _>>()?;
+            found.set.iter().map(|n| parse_rival(diagnosis, n, joints)).collect::<Result<Vec<_>, _>>()?;
         for rival in rivals.iter_mut().filter(|r| r.spec.to_string() == found.name) {
-            rival.sizes = sizes(&found.parameters);
+            rival.sizes = relative_amplitudes(&found.parameters);
         }
         let why = "the diagnosis leaves more than one name for what it found".to_owned();
         return Ok(Standing { rivals, nothing: false, certain, why });
@@ -52,25 +52,25 @@ pub fn standing(diagnosis: &Diagnosis, joints: &[String]) -> Result<Standing, Ru
     {
         let mut rivals = vec![Rival { spec, sizes: Vec::new() }];
         for candidate in diagnosis.candidates.iter().filter(|c| !c.spec.contains('+')).take(3) {
-            rivals.push(rival(diagnosis, &candidate.spec, joints)?);
+            rivals.push(parse_rival(diagnosis, &candidate.spec, joints)?);
         }
         let why =
             "the diagnosis found something unlisted; the listed effects that come nearest are its rivals";
         return Ok(Standing { rivals, nothing: false, certain, why: why.to_owned() });
     }
-    let rivals = untested(diagnosis, joints)?;
+    let rivals = untested_rivals(diagnosis, joints)?;
     let why = "these data could not have shown these effects at a typical size".to_owned();
     Ok(Standing { rivals, nothing: true, certain, why })
 }
 
 /// The explanations a user names; one alone is told from nothing.
-pub fn named(
+pub fn rivals_from_names(
     words: &[String],
     diagnosis: Option<&Diagnosis>,
     joints: &[String],
 ) -> Result<Standing, RunError> {
     let one = |word: &String| match diagnosis {
-        Some(diagnosis) => rival(diagnosis, word, joints),
+        Some(diagnosis) => parse_rival(diagnosis, word, joints),
         None => Ok(Rival { spec: EffectSpec::parse(word, joints)?, sizes: Vec::new() }),
     };
     let rivals = words.iter().map(one).collect::<Result<Vec<_>, RunError>>()?;
@@ -80,13 +80,13 @@ pub fn named(
 
 /// The effects that could not be tested and that depend on pose, direction or load, the most probable first. Events and
 /// drifts are no matter of where the arm goes.
-fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, RunError> {
+fn untested_rivals(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, RunError> {
     let rank = |name: &str| diagnosis.candidates.iter().position(|c| c.spec == name).unwrap_or(usize::MAX);
     let mut names: Vec<&String> = diagnosis.not_testable.iter().map(|n| &n.effect).collect();
     names.sort_by_key(|name| rank(name));
     let mut rivals: Vec<Rival> = Vec::new();
     for name in names {
-        let rival = rival(diagnosis, name, joints)?;
+        let rival = parse_rival(diagnosis, name, joints)?;
         let family = rival.spec.kind()?.family;
         if rivals.len() < UNTESTED && rival.spec.since.is_none() && family != Family::Drift {
             rivals.push(rival);
@@ -96,14 +96,14 @@ fn untested(diagnosis: &Diagnosis, joints: &[String]) -> Result<Vec<Rival>, RunE
 }
 
 /// An effect at the size that the data ask for, where they ask for one.
-fn rival(diagnosis: &Diagnosis, name: &str, joints: &[String]) -> Result<Rival, RunError> {
+fn parse_rival(diagnosis: &Diagnosis, name: &str, joints: &[String]) -> Result<Rival, RunError> {
     let spec = EffectSpec::parse(name, joints)?;
     let words = spec.to_string();
     let seen = diagnosis.candidates.iter().find(|c| c.spec == words);
-    Ok(Rival { spec, sizes: seen.map(|c| sizes(&c.parameters)).unwrap_or_default() })
+    Ok(Rival { spec, sizes: seen.map(|c| relative_amplitudes(&c.parameters)).unwrap_or_default() })
 }
 
-fn sizes(parameters: &[ParameterReport]) -> Vec<(String, f64)> {
+fn relative_amplitudes(parameters: &[ParameterReport]) -> Vec<(String, f64)> {
     let clear = |p: &ParameterReport| p.ci95[0] > 0.0 || p.ci95[1] < 0.0;
     if !parameters.iter().any(clear) {
         return Vec::new();

@@ -53,9 +53,9 @@ impl AtomicFile {
         // Like any newly created file: readable by all, as far as the umask lets it.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        remove_abandoned(folder(target), &prefix);
+        remove_abandoned(parent_folder(target), &prefix);
         for _ in 0..TRIES {
-            let temporary = builder.tempfile_in(folder(target)).map_err(|e| refused(e.to_string()))?;
+            let temporary = builder.tempfile_in(parent_folder(target)).map_err(|e| refused(e.to_string()))?;
             // Where a file system knows no locks, no part is ever removed by another process.
             let locked = temporary.as_file().try_lock();
             let held = !matches!(locked, Err(TryLockError::WouldBlock)) && temporary.path().exists();
@@ -107,7 +107,7 @@ impl AtomicFile {
             }
         }
         // The rename itself must survive a power cut too; not every file system can sync a folder.
-        if let Ok(folder) = File::open(folder(&target)) {
+        if let Ok(folder) = File::open(parent_folder(&target)) {
             let _ = folder.sync_all();
         }
         Ok(())
@@ -162,7 +162,7 @@ fn remove_abandoned(folder: &Path, prefix: &str) {
         let is_part =
             random.is_some_and(|r| r.len() == RANDOM_BYTES && r.bytes().all(|b| b.is_ascii_alphanumeric()));
         let may_be_ours = is_part && entry.file_type().is_ok_and(|t| t.is_file());
-        if !may_be_ours || input::noted(&entry.path()).is_some() {
+        if !may_be_ours || input::registered_path(&entry.path()).is_some() {
             continue;
         }
         if let Ok(file) = File::open(entry.path())
@@ -173,7 +173,7 @@ fn remove_abandoned(folder: &Path, prefix: &str) {
     }
 }
 
-fn folder(target: &Path) -> &Path {
+fn parent_folder(target: &Path) -> &Path {
     target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

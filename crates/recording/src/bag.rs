@@ -35,7 +35,7 @@ pub(crate) fn compare(files: &[RecordingFile], surveys: &[FileSurvey]) -> Vec<(u
     for (folder, members) in folders {
         let path = folder.join(FILE);
         let first = members[0];
-        let text = match read(&path) {
+        let text = match read_description(&path) {
             Ok(Some(text)) => text,
             Ok(None) => continue,
             Err(e) => {
@@ -45,7 +45,7 @@ pub(crate) fn compare(files: &[RecordingFile], surveys: &[FileSurvey]) -> Vec<(u
         };
         match Description::parse(&text) {
             Some(description) => {
-                let messages = |i: usize| messages(&files[i], &surveys[i]);
+                let messages = |i: usize| messages_by_topic(&files[i], &surveys[i]);
                 let named = members.iter().map(|i| (*i, name_of(&files[*i].path))).collect::<Vec<_>>();
                 description.compare(&folder, &named, &messages, &mut said);
             }
@@ -75,7 +75,7 @@ pub fn read_with(path: &Path) -> (Vec<PathBuf>, Option<PathBuf>) {
 }
 
 /// The text, where there is a file of that name.
-fn read(path: &Path) -> io::Result<Option<String>> {
+fn read_description(path: &Path) -> io::Result<Option<String>> {
     let about = match std::fs::metadata(path) {
         Ok(about) => about,
         Err(_) => return Ok(None),
@@ -89,7 +89,7 @@ fn read(path: &Path) -> io::Result<Option<String>> {
 }
 
 /// Messages by topic; `None` of a file that was not read whole.
-fn messages(file: &RecordingFile, survey: &FileSurvey) -> Option<BTreeMap<String, u64>> {
+fn messages_by_topic(file: &RecordingFile, survey: &FileSurvey) -> Option<BTreeMap<String, u64>> {
     let whole = survey.passed.len() == file.layout.blocks.len();
     let ranged = matches!(file.bytes, FileBytes::Ranged(_));
     if ranged && !whole {
@@ -108,7 +108,7 @@ fn name_of(path: &Path) -> String {
 }
 
 /// A name without what compressing adds.
-fn plain(name: &str) -> &str {
+fn uncompressed_name(name: &str) -> &str {
     COMPRESSED.into_iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name)
 }
 
@@ -146,13 +146,13 @@ impl Description {
                         }
                         _ => {}
                     }
-                    done(&mut keys);
+                    end_value(&mut keys);
                 }
                 Event::SequenceEnd => {
                     keys.pop();
-                    done(&mut keys);
+                    end_value(&mut keys);
                 }
-                Event::Alias(_) => done(&mut keys),
+                Event::Alias(_) => end_value(&mut keys),
                 Event::Scalar(value, ..) => {
                     if let Some(key @ None) = keys.last_mut() {
                         *key = Some(value.into_owned());
@@ -173,7 +173,7 @@ impl Description {
                         }
                         _ => {}
                     }
-                    done(&mut keys);
+                    end_value(&mut keys);
                 }
                 _ => {}
             }
@@ -189,7 +189,7 @@ impl Description {
         messages: &dyn Fn(usize) -> Option<BTreeMap<String, u64>>,
         said: &mut Vec<(usize, Said)>,
     ) {
-        let is = |listed: &str, name: &str| plain(listed) == plain(name);
+        let is = |listed: &str, name: &str| uncompressed_name(listed) == uncompressed_name(name);
         let listed = |name: &str| self.paths.iter().any(|path| is(path, name));
         let own: Vec<&(usize, String)> = members.iter().filter(|(_, name)| listed(name)).collect();
         let Some((first, _)) = own.first() else { return };
@@ -208,7 +208,10 @@ impl Description {
         let absent: Vec<&String> = self.paths.iter().filter(|path| !there(path)).collect();
         for path in &absent {
             let endings = [""].into_iter().chain(COMPRESSED);
-            if !endings.into_iter().any(|ending| folder.join(format!("{}{ending}", plain(path))).exists()) {
+            if !endings
+                .into_iter()
+                .any(|ending| folder.join(format!("{}{ending}", uncompressed_name(path))).exists())
+            {
                 said.push((*first, Ok(format!("metadata.yaml lists {path:?}, which is not there"))));
             }
         }
@@ -234,7 +237,7 @@ impl Description {
 }
 
 /// A value has ended: what comes next in a mapping is a key.
-fn done(keys: &mut [Option<String>]) {
+fn end_value(keys: &mut [Option<String>]) {
     if let Some(key) = keys.last_mut()
         && key.as_deref() != Some("-")
     {

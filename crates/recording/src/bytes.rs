@@ -90,7 +90,7 @@ impl FileBytes {
             std::fs::read_dir(path).map_err(open)?;
             return Err(refused("it is a folder without a recording in it (.mcap, .db3); name the files"));
         }
-        if let Some(what) = input::irregular(&about) {
+        if let Some(what) = input::irregular_kind(&about) {
             return Err(refused(&format!("it is {what}; copy it into a file first")));
         }
         let file = input::open(path).map_err(open)?;

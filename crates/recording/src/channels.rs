@@ -62,16 +62,16 @@ impl Definitions {
                 if let Some((id, schema)) = SchemaRecord::parse(record.body)
                     && !self.schemas.contains_key(&id)
                 {
-                    self.bytes = room(self.bytes, record.body.len())?;
+                    self.bytes = add_within_limit(self.bytes, record.body.len())?;
                     let before = self.schemas.last_key_value().map(|(_, schema)| &schema.encoding);
                     self.schemas.insert(id, Arc::new(schema.owned(before)));
                 }
             }
             op::CHANNEL => {
-                if let Some((id, mut channel)) = channel(record.body)
+                if let Some((id, mut channel)) = parse_channel(record.body)
                     && !self.channels.contains_key(&id)
                 {
-                    self.bytes = room(self.bytes, channel.bytes())?;
+                    self.bytes = add_within_limit(self.bytes, channel.bytes())?;
                     // Most channels are encoded alike, and say so in one text.
                     if let Some((_, before)) = self.channels.last_key_value()
                         && before.raw.message_encoding == channel.raw.message_encoding
@@ -98,7 +98,7 @@ impl Definitions {
                 self.schemas.get(&id).is_none_or(|known| schema.is(known))
             }
             op::CHANNEL => {
-                let (id, channel) = channel(record.body).ok_or("a channel that cannot be read")?;
+                let (id, channel) = parse_channel(record.body).ok_or("a channel that cannot be read")?;
                 self.channels.get(&id).is_none_or(|known| *known == channel)
             }
             _ => true,
@@ -130,7 +130,7 @@ impl Definitions {
             said = said.and(match self.schemas.entry(id) {
                 Entry::Occupied(known) if *known.get() != schema => Err(OTHER),
                 Entry::Occupied(_) => Ok(()),
-                Entry::Vacant(free) => room(self.bytes, schema.bytes()).map(|bytes| {
+                Entry::Vacant(free) => add_within_limit(self.bytes, schema.bytes()).map(|bytes| {
                     self.bytes = bytes;
                     free.insert(schema);
                 }),
@@ -140,7 +140,7 @@ impl Definitions {
             said = said.and(match self.channels.entry(id) {
                 Entry::Occupied(known) if *known.get() != channel => Err(OTHER),
                 Entry::Occupied(_) => Ok(()),
-                Entry::Vacant(free) => room(self.bytes, channel.bytes()).map(|bytes| {
+                Entry::Vacant(free) => add_within_limit(self.bytes, channel.bytes()).map(|bytes| {
                     self.bytes = bytes;
                     free.insert(channel);
                 }),
@@ -180,7 +180,7 @@ impl Definitions {
 }
 
 /// What is taken with so many bytes more.
-fn room(taken: usize, more: usize) -> Result<usize, &'static str> {
+fn add_within_limit(taken: usize, more: usize) -> Result<usize, &'static str> {
     Some(taken + more).filter(|bytes| *bytes <= most_definition_bytes()).ok_or(TOO_MANY)
 }
 
@@ -225,7 +225,7 @@ impl<'a> SchemaRecord<'a> {
     }
 }
 
-fn channel(body: &[u8]) -> Option<(u16, Channel)> {
+fn parse_channel(body: &[u8]) -> Option<(u16, Channel)> {
     let mut fields = Cursor::new(body);
     let (id, schema_id) = (fields.u16()?, fields.u16()?);
     let (topic, message_encoding) = (fields.string()?, fields.text()?.into());

@@ -5,7 +5,7 @@
 //! part of every report.
 
 use crate::Clock;
-use crate::gather::joined;
+use crate::gather::concat_parts;
 use armcal_core::robust::{percentile, percentile_in};
 
 /// Share of header stamps that must be set for the header clock to be used.
@@ -52,7 +52,11 @@ impl Stamps {
     pub fn of(parts: Vec<Stamps>) -> Stamps {
         let parts = parts.into_iter().map(|part| (part.header_ns, (part.publish_ns, part.log_ns)));
         let (header_ns, (publish_ns, log_ns)): (Vec<_>, (Vec<_>, Vec<_>)) = parts.unzip();
-        Stamps { header_ns: joined(header_ns), publish_ns: joined(publish_ns), log_ns: joined(log_ns) }
+        Stamps {
+            header_ns: concat_parts(header_ns),
+            publish_ns: concat_parts(publish_ns),
+            log_ns: concat_parts(log_ns),
+        }
     }
 
     /// Takes out the time of each row on the given clock; `None` for a row without it.
@@ -101,7 +105,7 @@ pub(crate) fn drop_stray(time_ns: &mut [Option<i64>], log_ns: &[i64]) -> u64 {
 }
 
 /// The clock to use and why.
-pub(crate) fn choose(stamps: &Stamps) -> (Clock, String) {
+pub(crate) fn choose_clock(stamps: &Stamps) -> (Clock, String) {
     let why_not_header = match judge_header(stamps) {
         Ok(why) => return (Clock::Header, why),
         Err(why) => why,
@@ -149,7 +153,7 @@ pub(crate) fn judge_header(stamps: &Stamps) -> Result<String, String> {
 /// Stamps must run like the log clock, whatever their offset from it.
 fn judge_spread(set: impl Iterator<Item = (i64, i64)> + Clone) -> Result<String, String> {
     let log = || set.clone().map(|(_, log)| log);
-    let duration_s = seconds(log().min(), log().max());
+    let duration_s = span_s(log().min(), log().max());
     if duration_s == 0.0 {
         return Ok("header stamps are set and increase; log time stands still".to_owned());
     }
@@ -171,7 +175,7 @@ fn judge_spread(set: impl Iterator<Item = (i64, i64)> + Clone) -> Result<String,
 /// Whether, where the two clocks differ from row to row, the header goes on evenly and log time does not.
 fn log_is_to_blame(set: &[(i64, i64)]) -> bool {
     let steps_of = |stamp: fn(&(i64, i64)) -> i64| -> Vec<f64> {
-        set.windows(2).map(|w| seconds(Some(stamp(&w[0])), Some(stamp(&w[1])))).collect()
+        set.windows(2).map(|w| span_s(Some(stamp(&w[0])), Some(stamp(&w[1])))).collect()
     };
     let (header, log) = (steps_of(|s| s.0), steps_of(|s| s.1));
     let (header_s, log_s) = (percentile(&header, 0.5), percentile(&log, 0.5));
@@ -200,7 +204,7 @@ fn judge_publish(stamps: &Stamps) -> Result<String, String> {
     Ok("publish time is set and differs from log time".to_owned())
 }
 
-fn seconds(from: Option<i64>, to: Option<i64>) -> f64 {
+fn span_s(from: Option<i64>, to: Option<i64>) -> f64 {
     from.zip(to).map_or(0.0, |(a, b)| b.saturating_sub(a) as f64 * 1e-9)
 }
 
@@ -222,7 +226,7 @@ mod tests {
     fn a_sane_header_wins_whatever_its_offset() {
         // The tracker's clock is a day off and drifts by 100 ppm.
         let s = stamps(|t| Some((t - 86_400_000_000_000) / 10_000 * 10_001), |t| t - 5);
-        assert_eq!(choose(&s).0, Clock::Header);
+        assert_eq!(choose_clock(&s).0, Clock::Header);
     }
 
     #[test]
@@ -254,30 +258,30 @@ mod tests {
         let (from, to) = (s.log_ns[300], s.log_ns[600]);
         s.log_ns.iter_mut().filter(|t| (from..to).contains(*t)).for_each(|t| *t = to - 1);
         s.publish_ns.clone_from(&s.log_ns);
-        let (clock, why) = choose(&s);
+        let (clock, why) = choose_clock(&s);
         assert!(clock == Clock::Header && why.contains("recorder that stalls"), "{why}");
         // A header clock that is set by 3 s for a while is not evenly spaced.
         let set = stamps(|t| Some(if (from..to).contains(&t) { t + 3_000_000_000 } else { t }), |t| t);
-        assert_eq!(choose(&set).0, Clock::Log);
+        assert_eq!(choose_clock(&set).0, Clock::Log);
     }
 
     #[test]
     fn a_bad_header_gives_way_to_publish_then_log() {
         let none = stamps(|_| None, |t| t - 3_000_000);
         assert_eq!(
-            choose(&none),
+            choose_clock(&none),
             (Clock::Publish, "messages carry no stamp; publish time is set and differs from log time".into())
         );
         let zero = stamps(|_| Some(0), |t| t);
-        let (clock, why) = choose(&zero);
+        let (clock, why) = choose_clock(&zero);
         assert_eq!(clock, Clock::Log);
         assert!(why.contains("all zero") && why.contains("equals log time"), "{why}");
         let stuck = stamps(|_| Some(1_700_000_000_000_000_000), |t| t);
-        assert!(choose(&stuck).1.contains("repeat"), "{:?}", choose(&stuck));
+        assert!(choose_clock(&stuck).1.contains("repeat"), "{:?}", choose_clock(&stuck));
         let slow = stamps(|t| Some(t / 2), |t| t);
-        assert!(choose(&slow).1.contains("wander"), "{:?}", choose(&slow));
+        assert!(choose_clock(&slow).1.contains("wander"), "{:?}", choose_clock(&slow));
         let falling = stamps(|t| Some(3_400_000_000_000_000_000 - t), |_| 0);
-        let (clock, why) = choose(&falling);
+        let (clock, why) = choose_clock(&falling);
         assert!(clock == Clock::Log && why.contains("backwards") && why.contains("not set"), "{why}");
     }
 }

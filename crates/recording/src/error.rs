@@ -155,7 +155,7 @@ pub fn shortened(text: &str) -> Cow<'_, str> {
 }
 
 /// The candidate most like `wanted`, when one is like it at all.
-pub fn nearest<S: AsRef<str>>(wanted: &str, candidates: impl IntoIterator<Item = S>) -> Option<String> {
+pub fn nearest_name<S: AsRef<str>>(wanted: &str, candidates: impl IntoIterator<Item = S>) -> Option<String> {
     let lower = wanted.to_lowercase();
     let candidates: Vec<S> = candidates.into_iter().collect();
     candidates
@@ -163,13 +163,13 @@ pub fn nearest<S: AsRef<str>>(wanted: &str, candidates: impl IntoIterator<Item =
         .map(S::as_ref)
         // Likeness takes time and memory in proportion to both lengths.
         .filter(|c| c.len() <= LONGEST)
-        .map(|c| (likeness(&lower, &c.to_lowercase()), c))
+        .map(|c| (name_similarity(&lower, &c.to_lowercase()), c))
         .filter(|(likeness, _)| *likeness > 0.6)
         .max_by(|a, b| a.0.total_cmp(&b.0).then_with(|| b.1.cmp(a.1)))
         .map(|(_, c)| c.to_owned())
 }
 
 /// Common beginnings count (Jaro-Winkler), and so do few edits with transpositions (Damerau-Levenshtein).
-fn likeness(a: &str, b: &str) -> f64 {
+fn name_similarity(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(a, b).max(strsim::normalized_damerau_levenshtein(a, b))
 }

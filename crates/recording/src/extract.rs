@@ -40,7 +40,7 @@ pub struct Extracted {
 /// read on. Damage is no error; it is in [`Recording::report`] afterwards.
 pub fn extract(recording: &Recording, wanted: &Extract<'_>, out: &Path) -> Result<Extracted, RecordingError> {
     may_write(out)?;
-    let channels = matching(recording.channels(), wanted.topics)?;
+    let channels = matching_channels(recording.channels(), wanted.topics)?;
     let mut output = McapOutput::create(out, common_profile(recording))?;
     let mut kept = Kept::of(&channels, &mut output)?;
     let topics: HashSet<&str> = channels.iter().map(|c| c.topic.as_str()).collect();
@@ -57,7 +57,7 @@ pub fn extract(recording: &Recording, wanted: &Extract<'_>, out: &Path) -> Resul
         })?;
     }
     recording.for_each_metadata(&mut |name, entries| output.metadata(name, entries))?;
-    output.metadata(EXTRACT_METADATA, &about(recording, &kept)?)?;
+    output.metadata(EXTRACT_METADATA, &source_metadata(recording, &kept)?)?;
     output.finish()?;
     Ok(Extracted { topics: kept.topics, attachments })
 }
@@ -108,7 +108,7 @@ impl Kept {
 }
 
 /// The channels whose topics match; a pattern that matches none is an error with the nearest topic.
-fn matching(
+fn matching_channels(
     channels: Vec<Arc<RawChannel>>,
     patterns: &[String],
 ) -> Result<Vec<Arc<RawChannel>>, RecordingError> {
@@ -127,7 +127,7 @@ fn matching(
             let mut present: Vec<String> = channels.iter().map(|c| c.topic.clone()).collect();
             present.sort();
             present.dedup();
-            let nearest = error::nearest(pattern, &present);
+            let nearest = error::nearest_name(pattern, &present);
             return Err(RecordingError::NoSuchTopic { pattern: pattern.clone(), nearest, present });
         }
     }
@@ -142,7 +142,7 @@ fn common_profile(recording: &Recording) -> &str {
 }
 
 /// Where the thin recording comes from. Local files by their names only: where they lie is no part of the content.
-fn about(recording: &Recording, kept: &Kept) -> Result<BTreeMap<String, String>, RecordingError> {
+fn source_metadata(recording: &Recording, kept: &Kept) -> Result<BTreeMap<String, String>, RecordingError> {
     let mut entries = BTreeMap::from([("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned())]);
     for (i, file) in recording.whole_report()?.files.iter().enumerate() {
         let name = match (&file.object, file.path.file_name()) {

@@ -136,7 +136,11 @@ impl Sketch {
         }
         let (common, alone): (Vec<_>, Vec<_>) =
             fewer.into_iter().partition(|row| more.binary_search(row).is_ok());
-        (!window.is_empty()).then(|| Overlap { window, common: times(&common), alone: times(&alone) })
+        (!window.is_empty()).then(|| Overlap {
+            window,
+            common: sorted_times(&common),
+            alone: sorted_times(&alone),
+        })
     }
 }
 
@@ -150,7 +154,7 @@ struct Overlap {
     alone: Vec<i64>,
 }
 
-fn times(rows: &[(u64, i64)]) -> Vec<i64> {
+fn sorted_times(rows: &[(u64, i64)]) -> Vec<i64> {
     let mut times: Vec<i64> = rows.iter().map(|(_, time_ns)| *time_ns).collect();
     times.sort_unstable();
     times

@@ -3,15 +3,15 @@
 use crate::budget::Allowance;
 use crate::clock::Stamps;
 use crate::decode::{Place, Plan, Role, Rows};
-use crate::error::nearest;
-use crate::foreign::{DEFINITION_FROM, inflated};
+use crate::error::nearest_name;
+use crate::foreign::{DEFINITION_FROM, inflate_message};
 use crate::joints::JointTable;
 use crate::occlusion::Seen;
-use crate::open::{RecordingFile, ns};
+use crate::open::{RecordingFile, saturating_ns};
 use crate::poses::PoseTable;
 use crate::raw::RawChannel;
 use crate::records::Message;
-use crate::sweep::{At, blocks, sweep};
+use crate::sweep::{At, blocks_for_channels, sweep};
 use crate::transforms::{Edge, Edges};
 use crate::{LengthUnit, Recording, RecordingError};
 use rayon::prelude::*;
@@ -103,18 +103,18 @@ impl Gathered {
             || Stamps::of(stamps),
             || rayon::join(|| JointTable::of(joints), || PoseTable::of(poses)),
         );
-        Gathered { stamps, joints, poses, scalars: joined(scalars), ..whole }
+        Gathered { stamps, joints, poses, scalars: concat_parts(scalars), ..whole }
     }
 }
 
 /// Whether a topic is there that can be read like this.
 pub(crate) fn can_read(recording: &Recording, request: &Request<'_>) -> bool {
     let mut channels = recording.files.iter().flat_map(RecordingFile::channels);
-    channels.any(|(_, c)| c.topic == request.topic && compile(c, request).is_ok())
+    channels.any(|(_, c)| c.topic == request.topic && compile_channel(c, request).is_ok())
 }
 
 /// One column of its parts in order, copied once if there are several.
-pub(crate) fn joined<T>(mut parts: Vec<Vec<T>>) -> Vec<T> {
+pub(crate) fn concat_parts<T>(mut parts: Vec<Vec<T>>) -> Vec<T> {
     parts.retain(|part| !part.is_empty());
     if parts.len() < 2 {
         return parts.pop().unwrap_or_default();
@@ -134,7 +134,7 @@ struct Target {
 }
 
 /// Decodes the wanted channels in one pass. The surveys of the pass are remembered by the recording.
-pub(crate) fn gather(
+pub(crate) fn gather_streams(
     recording: &Recording,
     requests: &[Request<'_>],
 ) -> Result<Vec<Gathered>, RecordingError> {
@@ -142,14 +142,15 @@ pub(crate) fn gather(
     wanted.resize_with(recording.files.len(), BTreeMap::new);
     let mut unreadable = Vec::new();
     for (index, request) in requests.iter().enumerate() {
-        unreadable.push(target(recording, index, request, &mut wanted)?);
+        unreadable.push(compile_targets(recording, index, request, &mut wanted)?);
     }
     let channels: Vec<BTreeSet<u16>> = wanted.iter().map(|w| w.keys().copied().collect()).collect();
     let allowance = recording.allowance();
-    let rows: Vec<f64> = (0..requests.len()).map(|request| declared(recording, &wanted, request)).collect();
+    let rows: Vec<f64> =
+        (0..requests.len()).map(|request| declared_message_count(recording, &wanted, request)).collect();
     let (surveys, stretches) = sweep(
         recording,
-        &blocks(&recording.files, &channels),
+        &blocks_for_channels(&recording.files, &channels),
         |share| {
             requests.iter().zip(&rows).map(|(r, rows)| Stretch::new(r.kind, share * rows)).collect::<Vec<_>>()
         },
@@ -171,7 +172,11 @@ pub(crate) fn gather(
 }
 
 /// How many messages the files say that there are for a request: what room is made for, believed no further than that.
-fn declared(recording: &Recording, wanted: &[BTreeMap<u16, Vec<Target>>], request: usize) -> f64 {
+fn declared_message_count(
+    recording: &Recording,
+    wanted: &[BTreeMap<u16, Vec<Target>>],
+    request: usize,
+) -> f64 {
     let of_file = |(file, wanted): (&RecordingFile, &BTreeMap<u16, Vec<Target>>)| {
         let counts = file.layout.statistics.as_ref().map(|s| &s.channel_message_counts);
         let of_request = wanted.iter().filter(|(_, targets)| targets.iter().any(|t| t.request == request));
@@ -183,7 +188,7 @@ fn declared(recording: &Recording, wanted: &[BTreeMap<u16, Vec<Target>>], reques
 }
 
 /// Compiles a plan for every channel of the topic that can be read, and returns why the others cannot.
-fn target(
+fn compile_targets(
     recording: &Recording,
     index: usize,
     request: &Request<'_>,
@@ -193,7 +198,7 @@ fn target(
     let mut readable = 0;
     for (file, wanted) in recording.files.iter().zip(wanted) {
         for (id, channel) in file.channels().filter(|(_, c)| c.topic == request.topic) {
-            match compile(channel, request) {
+            match compile_channel(channel, request) {
                 Ok((plan, to_m)) => {
                     readable += 1;
                     let cdr = *channel.message_encoding == *"cdr";
@@ -212,7 +217,7 @@ fn target(
     if unreadable.is_empty() {
         let channels = recording.files.iter().flat_map(RecordingFile::channels);
         let present: BTreeSet<String> = channels.map(|(_, c)| c.topic.clone()).collect();
-        let nearest = nearest(&topic, &present);
+        let nearest = nearest_name(&topic, &present);
         return Err(RecordingError::TopicMissing {
             role,
             topic,
@@ -224,7 +229,7 @@ fn target(
     Err(RecordingError::NotDecodable { role, topic, why })
 }
 
-fn compile(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f64), String> {
+fn compile_channel(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f64), String> {
     let Some(schema) = &channel.schema else {
         return Err("a channel without a schema cannot be decoded".to_owned());
     };
@@ -284,13 +289,16 @@ impl<'a> Stretch<'a> {
         gathered.messages += 1;
         rows.clear();
         let decode = |data: Cow<'_, [u8]>| target.plan.decode(&data, rows).map_err(|e| e.to_string());
-        let data = if target.cdr { inflated(message.data, allowance) } else { Ok(message.data.into()) };
+        let data =
+            if target.cdr { inflate_message(message.data, allowance) } else { Ok(message.data.into()) };
         if let Err(why) = data.and_then(decode) {
             gathered.undecodable += 1;
             gathered.first_error.get_or_insert(why);
         }
         let Gathered { stamps, joints, poses, scalars, edges, .. } = gathered;
-        let mut stamp = |header_ns| stamps.push(header_ns, ns(message.publish_ns), ns(message.log_ns));
+        let mut stamp = |header_ns| {
+            stamps.push(header_ns, saturating_ns(message.publish_ns), saturating_ns(message.log_ns))
+        };
         match (&*rows, self.kind) {
             (Rows::Joints(rows), Kind::Joints { wanted }) => {
                 let kept = rows.rows().filter(|row| joints.take(row, wanted));

@@ -36,7 +36,7 @@ pub fn may_write(target: &Path) -> Result<(), RecordingError> {
 /// # Errors
 /// As [`may_write`].
 pub fn may_write_over(target: &Path, over: Over) -> Result<(), RecordingError> {
-    match there(target, over)? {
+    match existing_target(target, over)? {
         There::Foreign(what) => Err(not_ours(target, what)),
         _ => Ok(()),
     }
@@ -68,32 +68,32 @@ pub fn may_put(target: &Path, bytes: &[u8]) -> Result<(), RecordingError> {
     if is_there(target, bytes)? {
         return Ok(());
     }
-    fits(target, there(target, Over::Unchanged)?, Mark::of_text(bytes))
+    check_replaceable(target, existing_target(target, Over::Unchanged)?, Mark::of_text(bytes))
 }
 
 /// Whether a file has just this content; an input is an error even then.
 pub(crate) fn is_there(target: &Path, bytes: &[u8]) -> Result<bool, RecordingError> {
     refuse_input(target)?;
-    Ok(holds(target, bytes))
+    Ok(file_has_content(target, bytes))
 }
 
 /// Whether a file, and no link to one, has just this content.
-pub fn holds(path: &Path, bytes: &[u8]) -> bool {
+pub fn file_has_content(path: &Path, bytes: &[u8]) -> bool {
     let plain = path.symlink_metadata().is_ok_and(|a| a.is_file() && a.len() == bytes.len() as u64);
     plain && std::fs::read(path).is_ok_and(|there| there == bytes)
 }
 
 /// Whether a finished file may take the place of `target`; says whether there is anything to replace.
 pub(crate) fn may_replace(target: &Path, finished: &Path, over: Over) -> Result<bool, RecordingError> {
-    let there = there(target, over)?;
+    let there = existing_target(target, over)?;
     if let There::Nothing = there {
         return Ok(false);
     }
     let failed = |e: io::Error| RecordingError::Write { path: target.to_owned(), why: e.to_string() };
-    fits(target, there, Mark::of_file(finished).map_err(failed)?).map(|()| true)
+    check_replaceable(target, there, Mark::of_file(finished).map_err(failed)?).map(|()| true)
 }
 
-fn fits(target: &Path, there: There, new: Option<Mark>) -> Result<(), RecordingError> {
+fn check_replaceable(target: &Path, there: There, new: Option<Mark>) -> Result<(), RecordingError> {
     match (there, new) {
         (There::Nothing | There::Empty, _) | (There::Ours(None), Some(_)) => Ok(()),
         (There::Ours(Some(old)), Some(new)) if new.replaces(&old) => Ok(()),
@@ -110,7 +110,7 @@ fn refuse_url(target: &Path) -> Result<(), RecordingError> {
     if is_url(target) { Err(RecordingError::NoFile { path: target.to_owned() }) } else { Ok(()) }
 }
 
-fn there(target: &Path, over: Over) -> Result<There, RecordingError> {
+fn existing_target(target: &Path, over: Over) -> Result<There, RecordingError> {
     refuse_url(target)?;
     // Without following a link, which is nothing that armcal makes.
     let about = match target.symlink_metadata() {
@@ -126,7 +126,7 @@ fn there(target: &Path, over: Over) -> Result<There, RecordingError> {
     if about.is_symlink() {
         return Ok(There::Foreign("is a link".to_owned()));
     }
-    if let Some(what) = input::irregular(&about) {
+    if let Some(what) = input::irregular_kind(&about) {
         return Ok(There::Foreign(format!("is {what}")));
     }
     if about.len() == 0 {
@@ -178,7 +178,7 @@ pub fn make_folder_in(outer: &Path, inner: impl AsRef<Path>) -> Result<PathBuf, 
 }
 
 fn refuse_input(target: &Path) -> Result<(), RecordingError> {
-    match input::noted(target) {
+    match input::registered_path(target) {
         Some(input) => Err(RecordingError::IsInput { path: target.to_owned(), input }),
         None => Ok(()),
     }

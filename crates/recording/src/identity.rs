@@ -74,8 +74,8 @@ impl Pieces {
             crc.combine(&crc32fast::Hasher::new_with_initial_len(piece.crc, covered));
         }
         let hashes: Vec<ChainingValue> = known.iter().map(|piece| piece.hash).collect();
-        let name = named(match halves(&hashes) {
-            Some((left, right)) => merge_subtrees_root(&subtree(left), &subtree(right), Mode::Hash),
+        let name = prefixed_hash(match split_halves(&hashes) {
+            Some((left, right)) => merge_subtrees_root(&subtree_hash(left), &subtree_hash(right), Mode::Hash),
             None => blake3::hash(file),
         });
         (name, crc.finalize())
@@ -83,19 +83,19 @@ impl Pieces {
 }
 
 /// By the name of the hash, so that nobody takes it for another.
-pub(crate) fn named(hash: blake3::Hash) -> String {
+pub(crate) fn prefixed_hash(hash: blake3::Hash) -> String {
     format!("blake3:{}", hash.to_hex())
 }
 
-fn subtree(pieces: &[ChainingValue]) -> ChainingValue {
-    match halves(pieces) {
-        Some((left, right)) => merge_subtrees_non_root(&subtree(left), &subtree(right), Mode::Hash),
+fn subtree_hash(pieces: &[ChainingValue]) -> ChainingValue {
+    match split_halves(pieces) {
+        Some((left, right)) => merge_subtrees_non_root(&subtree_hash(left), &subtree_hash(right), Mode::Hash),
         None => pieces.first().copied().unwrap_or_default(),
     }
 }
 
 /// The left half is as large as a power of two can be that leaves something to the right.
-fn halves(pieces: &[ChainingValue]) -> Option<(&[ChainingValue], &[ChainingValue])> {
+fn split_halves(pieces: &[ChainingValue]) -> Option<(&[ChainingValue], &[ChainingValue])> {
     (pieces.len() > 1).then(|| pieces.split_at(pieces.len().next_power_of_two() / 2))
 }
 
@@ -117,7 +117,7 @@ mod tests {
                 pieces.hash(&file, &(start..rest));
                 rest = start;
             }
-            let expected = (named(blake3::hash(&file)), crc32fast::hash(&file[..crc_to]));
+            let expected = (prefixed_hash(blake3::hash(&file)), crc32fast::hash(&file[..crc_to]));
             assert_eq!(pieces.identity(&file, |_| panic!("all are hashed")), expected, "{bytes}");
             let anew = Pieces::with_crc(bytes, crc_to);
             assert_eq!(anew.identity(&file, drop), expected, "{bytes}");

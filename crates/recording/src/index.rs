@@ -148,7 +148,7 @@ impl Summary {
         let refused = self.chunks.iter().filter(too_large).map(|c| c.chunk_start as usize).collect();
         let bodies = |records: &[(u64, u64)]| -> Result<Vec<Range<usize>>, &'static str> {
             let body = |(offset, length): &(u64, u64)| {
-                range(*offset, *length).map(|r| r.start + ENVELOPE..r.end).filter(|r| r.start <= r.end)
+                byte_range(*offset, *length).map(|r| r.start + ENVELOPE..r.end).filter(|r| r.start <= r.end)
             };
             records.iter().map(|r| body(r).ok_or(OUTSIDE)).collect()
         };
@@ -162,7 +162,7 @@ impl Summary {
             attachments: bodies(&self.attachments)?,
             metadata: bodies(&self.metadata)?,
             first_ns: self.chunks.iter().map(|c| c.start_ns).filter(|ns| *ns > 0).min(),
-            declared: declared(&statistics, &self.chunks),
+            declared: declared_tallies(&statistics, &self.chunks),
             definitions: self.definitions,
             definitions_complete: true,
             statistics: Some(statistics),
@@ -196,15 +196,16 @@ impl Summary {
     fn blocks(&self, data: &Range<usize>) -> Result<Vec<Block>, &'static str> {
         let mut known: Vec<(Range<usize>, Option<Block>)> = Vec::new();
         for (offset, length) in self.attachments.iter().chain(&self.metadata) {
-            known.push((range(*offset, *length).ok_or(OUTSIDE)?, None));
+            known.push((byte_range(*offset, *length).ok_or(OUTSIDE)?, None));
         }
         for chunk in &self.chunks {
-            let record =
-                range(chunk.chunk_start, chunk.chunk_length).filter(|r| r.len() > ENVELOPE).ok_or(OUTSIDE)?;
+            let record = byte_range(chunk.chunk_start, chunk.chunk_length)
+                .filter(|r| r.len() > ENVELOPE)
+                .ok_or(OUTSIDE)?;
             if record.len() > MAX_CHUNK_BYTES {
                 return Err("one of its chunks is larger than a chunk may be");
             }
-            let indexes = range(record.end as u64, chunk.message_index_length).ok_or(OUTSIDE)?;
+            let indexes = byte_range(record.end as u64, chunk.message_index_length).ok_or(OUTSIDE)?;
             let indexed = !chunk.message_indexes.is_empty();
             let body = record.start + ENVELOPE..record.end;
             let block = Block {
@@ -238,13 +239,13 @@ impl Summary {
 
 const OUTSIDE: &str = "its summary lists records that overlap or lie outside the data";
 
-fn range(offset: u64, length: u64) -> Option<Range<usize>> {
+fn byte_range(offset: u64, length: u64) -> Option<Range<usize>> {
     let end = usize::try_from(offset.checked_add(length)?).ok()?;
     Some(usize::try_from(offset).ok()?..end)
 }
 
 /// Messages of each channel as the statistics count them; first and last are times of the chunks that hold any.
-fn declared(statistics: &Statistics, chunks: &[ChunkIndex]) -> BTreeMap<u16, Tally> {
+fn declared_tallies(statistics: &Statistics, chunks: &[ChunkIndex]) -> BTreeMap<u16, Tally> {
     let mut times: BTreeMap<u16, (u64, u64)> = BTreeMap::new();
     for chunk in chunks {
         for id in chunk.message_indexes.keys() {
@@ -272,7 +273,7 @@ pub(crate) fn body_of_chunk(record: &[u8]) -> Result<&[u8], String> {
 }
 
 /// Numbers the blocks that may hold one of these channels.
-pub(crate) fn holding(blocks: &[Block], wanted: &BTreeSet<u16>) -> Vec<usize> {
+pub(crate) fn candidate_blocks(blocks: &[Block], wanted: &BTreeSet<u16>) -> Vec<usize> {
     let may_hold =
         |block: &Block| block.holds.as_ref().is_none_or(|ids| ids.iter().any(|id| wanted.contains(id)));
     (0..blocks.len()).filter(|i| !wanted.is_empty() && may_hold(&blocks[*i])).collect()

@@ -54,9 +54,9 @@ impl Kind {
 /// # Errors
 /// A pipe, a device, a socket, a folder or a pointer, each by what it is; what the system refuses.
 pub fn open(path: &Path) -> io::Result<File> {
-    let file = regular(path)?;
+    let file = open_regular(path)?;
     refuse_pointer(&file)?;
-    remember(path, &file.metadata()?);
+    add_to_register(path, &file.metadata()?);
     Ok(file)
 }
 
@@ -67,7 +67,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 pub fn read_to_string(path: &Path, kind: Kind) -> io::Result<String> {
     let mut bytes = Vec::new();
     read_on(&mut open(path)?, kind, &mut bytes)?;
-    String::from_utf8(bytes).map_err(|_| invalid("it is not UTF-8 text".to_owned()))
+    String::from_utf8(bytes).map_err(|_| invalid_input("it is not UTF-8 text".to_owned()))
 }
 
 /// Reads the rest of an input of which `bytes` has the beginning.
@@ -78,7 +78,10 @@ pub fn read_on(file: &mut File, kind: Kind, bytes: &mut Vec<u8>) -> io::Result<(
     let most = kind.most_bytes();
     file.take((most + 1).saturating_sub(bytes.len() as u64)).read_to_end(bytes)?;
     if bytes.len() as u64 > most {
-        return Err(invalid(format!("it is larger than the {} MiB that such a file may have", most >> 20)));
+        return Err(invalid_input(format!(
+            "it is larger than the {} MiB that such a file may have",
+            most >> 20
+        )));
     }
     Ok(())
 }
@@ -87,7 +90,7 @@ pub fn read_on(file: &mut File, kind: Kind, bytes: &mut Vec<u8>) -> io::Result<(
 ///
 /// # Errors
 /// As [`open`], but for the pointer.
-pub fn regular(path: &Path) -> io::Result<File> {
+pub fn open_regular(path: &Path) -> io::Result<File> {
     // Asked before, because opening some devices does something, and after, because the name may lead elsewhere by then.
     refuse_irregular(&std::fs::metadata(path)?)?;
     let mut options = File::options();
@@ -101,7 +104,7 @@ pub fn regular(path: &Path) -> io::Result<File> {
 }
 
 /// What a name leads to that is no file, in words.
-pub(crate) fn irregular(about: &Metadata) -> Option<&'static str> {
+pub(crate) fn irregular_kind(about: &Metadata) -> Option<&'static str> {
     let kind = about.file_type();
     #[cfg(unix)]
     {
@@ -121,11 +124,11 @@ pub(crate) fn irregular(about: &Metadata) -> Option<&'static str> {
 }
 
 fn refuse_irregular(about: &Metadata) -> io::Result<()> {
-    match irregular(about) {
+    match irregular_kind(about) {
         None => Ok(()),
-        Some("a folder") => Err(invalid("it is a folder, where a file belongs".to_owned())),
+        Some("a folder") => Err(invalid_input("it is a folder, where a file belongs".to_owned())),
         Some(what) => {
-            Err(invalid(format!("it is {what}, and only files are read: copy what it gives into one")))
+            Err(invalid_input(format!("it is {what}, and only files are read: copy what it gives into one")))
         }
     }
 }
@@ -141,39 +144,39 @@ fn refuse_pointer(mut file: &File) -> io::Result<()> {
     if POINTERS.iter().any(|begins| head.starts_with(begins)) {
         let why =
             "it is a Git LFS pointer, which only names the file: `git lfs pull` fetches the file itself";
-        return Err(invalid(why.to_owned()));
+        return Err(invalid_input(why.to_owned()));
     }
     Ok(())
 }
 
-fn invalid(why: String) -> io::Error {
+fn invalid_input(why: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, why)
 }
 
 /// Notes an input that will be read later, so that no output is begun in its place. What is not there, or no file, is none.
-pub fn note(path: &Path) {
+pub fn register_path(path: &Path) {
     if let Ok(about) = std::fs::metadata(path) {
-        remember(path, &about);
+        add_to_register(path, &about);
     }
 }
 
 /// The input that this file is, as it was named; `None` if it is none.
-pub(crate) fn noted(path: &Path) -> Option<PathBuf> {
+pub(crate) fn registered_path(path: &Path) -> Option<PathBuf> {
     let about = std::fs::metadata(path).ok()?;
-    let inputs = inputs();
+    let inputs = lock_inputs();
     identities(path, &about).iter().find_map(|identity| inputs.get(identity)).cloned()
 }
 
-fn remember(path: &Path, about: &Metadata) {
+fn add_to_register(path: &Path, about: &Metadata) {
     if about.is_file() {
-        let mut inputs = inputs();
+        let mut inputs = lock_inputs();
         for identity in identities(path, about) {
             inputs.entry(identity).or_insert_with(|| path.to_owned());
         }
     }
 }
 
-fn inputs() -> MutexGuard<'static, BTreeMap<Identity, PathBuf>> {
+fn lock_inputs() -> MutexGuard<'static, BTreeMap<Identity, PathBuf>> {
     // Whoever panicked while holding it has at worst left one out that was being added.
     INPUTS.lock().unwrap_or_else(PoisonError::into_inner)
 }

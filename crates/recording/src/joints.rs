@@ -2,8 +2,8 @@
 
 use crate::clean::quantisation_step;
 use crate::decode::JointRow;
-use crate::error::nearest;
-use crate::gather::joined;
+use crate::error::nearest_name;
+use crate::gather::concat_parts;
 use crate::{JointStream, JointUnit, RecordingError};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -39,7 +39,7 @@ impl JointTable {
         if self.last_names.as_ref().is_none_or(|names| !Arc::ptr_eq(names, row.names)) {
             self.present.extend(row.names.iter().cloned());
             self.last_names = Some(Arc::clone(row.names));
-            self.last_columns = columns(row.names, wanted);
+            self.last_columns = joint_columns(row.names, wanted);
         }
         let at = self.last_columns.as_ref();
         let Some(at) = at.filter(|at| at.iter().all(|k| *k < row.position.len())) else {
@@ -76,8 +76,8 @@ impl JointTable {
                 .collect()
         };
         let (position, effort) = (column(|t| &mut t.position), column(|t| &mut t.effort));
-        whole.position = position.into_par_iter().map(joined).collect();
-        whole.effort = effort.into_par_iter().map(joined).collect();
+        whole.position = position.into_par_iter().map(concat_parts).collect();
+        whole.effort = effort.into_par_iter().map(concat_parts).collect();
         whole
     }
 
@@ -93,7 +93,7 @@ impl JointTable {
                 return RecordingError::JointMissing {
                     topic: stream.topic.clone(),
                     joint: joint.clone(),
-                    nearest: nearest(joint, &self.present),
+                    nearest: nearest_name(joint, &self.present),
                     present: self.present.iter().cloned().collect(),
                 };
             }
@@ -104,7 +104,7 @@ impl JointTable {
 }
 
 /// Where each wanted joint is; the first values in order when the message names none; `None` when one is missing.
-fn columns(names: &[String], wanted: &[String]) -> Option<Vec<usize>> {
+fn joint_columns(names: &[String], wanted: &[String]) -> Option<Vec<usize>> {
     if names.is_empty() {
         return Some((0..wanted.len()).collect());
     }
@@ -163,7 +163,7 @@ pub(crate) fn to_rad(joints: &mut [Vec<f64>], stream: &JointStream) {
 }
 
 /// The efforts [N m] of joint after joint; `None` where no row has any.
-pub(crate) fn effort(columns: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
+pub(crate) fn recorded_effort(columns: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
     columns.iter().flatten().any(|e| e.is_finite()).then_some(columns)
 }
 
@@ -215,7 +215,7 @@ pub(crate) fn check_unit(joint_rad: &[Vec<f64>], stream: &JointStream) -> Result
 }
 
 /// Whether the readings of each row are ones that a joint can have; a flipped bit gives the others. `None` where all are.
-pub(crate) fn possible(joint_rad: &[Vec<f64>], stream: &JointStream) -> Option<Vec<bool>> {
+pub(crate) fn possible_row_mask(joint_rad: &[Vec<f64>], stream: &JointStream) -> Option<Vec<bool>> {
     let possible = |q: &f64| q.abs() <= 10.0 * stream.max_turns * TAU;
     let rows = joint_rad.first().map_or(0, Vec::len);
     let row = |i: usize| joint_rad.iter().all(|column| possible(&column[i]));

@@ -4,7 +4,7 @@ use crate::bytes::FileBytes;
 use crate::chunk::Inflater;
 use crate::damage::Faults;
 use crate::index::body_of_chunk;
-use crate::layout::{Content, FIRST_PRIVATE, Layout, mixed};
+use crate::layout::{Content, FIRST_PRIVATE, Layout, hash_pair};
 use crate::open::RecordingFile;
 use crate::records::{ChunkHeader, Cursor, Message, Records};
 use crate::sweep::{At, FileSurvey, Tally};
@@ -20,7 +20,7 @@ pub(crate) struct Judged {
 }
 
 /// Hands every sound message of a block to `each`, and says what else it showed.
-pub(crate) fn judged(
+pub(crate) fn judge_block(
     file: &RecordingFile,
     at: At,
     fetched: Option<&Bytes>,
@@ -31,7 +31,7 @@ pub(crate) fn judged(
     let survey = FileSurvey { definitions: file.layout.definitions.beside(), ..FileSurvey::default() };
     let mut pass = Pass { file, at, survey, short: 0, each };
     let mut inflated = None;
-    match (&block.content, stored(file, at, fetched)) {
+    match (&block.content, stored_bytes(file, at, fetched)) {
         (_, Err(why)) => pass.lost(block.offset, || format!("chunk dropped: {why}")),
         (Content::Records(_), Ok((bytes, _))) => pass.records(bytes, inflater),
         (Content::Chunk { .. }, Ok((body, indexes))) => {
@@ -55,7 +55,7 @@ pub(crate) fn judged(
 }
 
 /// The bytes of a block as they are in the file: the body of a chunk and the message indexes behind it, or records.
-fn stored<'a>(
+fn stored_bytes<'a>(
     file: &'a RecordingFile,
     at: At,
     fetched: Option<&'a Bytes>,
@@ -252,7 +252,7 @@ struct Seen {
 impl Chunk {
     fn count(&mut self, message: &Message<'_>, place: u64) {
         let one = Tally { messages: 1, first_ns: message.log_ns, last_ns: message.log_ns };
-        let mixed = mixed(message.log_ns, place);
+        let mixed = hash_pair(message.log_ns, place);
         self.channels
             .entry(message.channel_id)
             .and_modify(|seen| {
@@ -307,7 +307,7 @@ fn parse_index(body: &[u8]) -> Option<(u16, u64, u64)> {
     let mut entries = Cursor::new(fields.bytes()?);
     let (mut count, mut sum) = (0, 0_u64);
     while !entries.rest().is_empty() {
-        sum = sum.wrapping_add(mixed(entries.u64()?, entries.u64()?));
+        sum = sum.wrapping_add(hash_pair(entries.u64()?, entries.u64()?));
         count += 1;
     }
     Some((channel, count, sum))

@@ -111,12 +111,12 @@ pub(crate) struct Places {
 impl Places {
     pub fn add(&mut self, offset: u64, length: u64) {
         self.count += 1;
-        self.mixed = self.mixed.wrapping_add(mixed(offset, length));
+        self.mixed = self.mixed.wrapping_add(hash_pair(offset, length));
     }
 }
 
 /// Two numbers as one, in which a change of either shows; a sum of such is the same in any order.
-pub(crate) fn mixed(a: u64, b: u64) -> u64 {
+pub(crate) fn hash_pair(a: u64, b: u64) -> u64 {
     let product = (a ^ b.rotate_left(32)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     product ^ (product >> 29)
 }
@@ -210,14 +210,14 @@ impl Layout {
                 op::DATA_END if record.body.len() == DATA_END_BYTES => {
                     let crc = Cursor::new(record.body).u32().filter(|crc| *crc != 0);
                     self.data_crc = crc.map(|crc| DataCrc { end: record.offset, crc });
-                    return DataSection::Ended(body(&record).end);
+                    return DataSection::Ended(body_range(&record).end);
                 }
                 op::FOOTER if is_footer(walk.bytes, &record) => return DataSection::Footer(record),
                 _ => self.take(walk, &record),
             }
             touched += record.body.len().min(TOUCHED_BYTES);
             if touched >= RELEASED_BYTES {
-                let end = body(&record).end;
+                let end = body_range(&record).end;
                 map.release(released_to..end);
                 (released_to, touched) = (end, 0);
             }
@@ -227,7 +227,7 @@ impl Layout {
 
     /// Takes in one record of the data section.
     fn take(&mut self, walk: &mut Walk<'_>, record: &RawRecord<'_>) {
-        let range = record.offset..body(record).end;
+        let range = record.offset..body_range(record).end;
         let first = record.offset == mcap::MAGIC.len();
         if first && record.op != op::HEADER {
             self.faults.lost(record.offset, || "the file does not begin with a header".to_owned());
@@ -241,8 +241,8 @@ impl Layout {
                 }
             }
             op::CHUNK => self.take_chunk(walk, record),
-            op::ATTACHMENT => self.attachments.push(body(record)),
-            op::METADATA => self.metadata.push(body(record)),
+            op::ATTACHMENT => self.attachments.push(body_range(record)),
+            op::METADATA => self.metadata.push(body_range(record)),
             op::SCHEMA | op::CHANNEL => {
                 if let Err(why) = self.definitions.absorb(record) {
                     self.faults.lost(record.offset, || why.to_owned());
@@ -274,7 +274,7 @@ impl Layout {
 
     fn take_chunk(&mut self, walk: &mut Walk<'_>, record: &RawRecord<'_>) {
         self.chunks += 1;
-        let range = record.offset..body(record).end;
+        let range = record.offset..body_range(record).end;
         let Some((header, packed)) = ChunkHeader::parse(record.body) else {
             // Told by whoever passes over it. What is shorter than any chunk need not be remembered.
             if record.body.len() >= ChunkHeader::LEAST_BYTES {
@@ -291,7 +291,7 @@ impl Layout {
         if range.len() < LARGE_CHUNK_BYTES && claim < LARGE_CLAIM_BYTES {
             return self.extend_records(range, claim);
         }
-        self.blocks.push(Block::chunk(range.start, body(record), claim));
+        self.blocks.push(Block::chunk(range.start, body_range(record), claim));
     }
 
     /// What inflating a chunk makes [bytes]; nothing, where that would be too much.
@@ -339,12 +339,12 @@ enum DataSection<'a> {
 
 /// Whether a record with the footer's opcode is one: of its length, and last.
 fn is_footer(bytes: &[u8], record: &RawRecord<'_>) -> bool {
-    let end = body(record).end;
+    let end = body_range(record).end;
     record.body.len() == FOOTER_BYTES && (end == bytes.len() || bytes[end..].starts_with(mcap::MAGIC))
 }
 
 /// The bytes of a record's body in its file.
-fn body(record: &RawRecord<'_>) -> Range<usize> {
+fn body_range(record: &RawRecord<'_>) -> Range<usize> {
     let start = record.offset + ENVELOPE;
     start..start + record.body.len()
 }

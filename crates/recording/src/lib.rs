@@ -10,7 +10,7 @@
 //! between) -> `reading` (columns: clock, cleaning, units). `read` takes all streams of a pipeline through these.
 //!
 //! What was read is compared with whatever else says what was written: `witness`, and of rosbag2 `bag` and `foreign`. A
-//! disagreement is data lost, which the process remembers ([`losses`]).
+//! disagreement is data lost, which the process remembers ([`data_loss_warnings`]).
 //!
 //! [`Recording::open`] takes any MCAP: chunked or not, indexed or not, zstd, lz4 or uncompressed, finished, cut
 //! off or damaged. What is sound is used; what is not is reported with its byte offset and reason. Nothing panics
@@ -75,25 +75,25 @@ mod witness;
 pub use bag::read_with;
 pub use budget::Allowance;
 pub use bytes::{Access, identity_of, sha256_of};
-pub use error::{RecordingError, nearest, shortened};
+pub use error::{RecordingError, nearest_name, shortened};
 pub use extract::{EXTRACT_METADATA, Extract, Extracted, extract};
 pub use fingerprint::{Fingerprint, SharedTime};
-pub use foreign::inflated;
+pub use foreign::inflate_message;
 pub use foreign::names::{files_of, is_recording, recordings_at, without_ending};
 pub use guard::{
-    Over, holds, make_folder, make_folder_in, may_put, may_write, may_write_all, may_write_over,
+    Over, file_has_content, make_folder, make_folder_in, may_put, may_write, may_write_all, may_write_over,
 };
-pub use losses::losses;
+pub use losses::data_loss_warnings;
 pub use mark::SET_POINTS_METADATA;
 pub use open::Recording;
 pub use raw::{Attachment, MetadataVisitor, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor};
 pub use report::*;
-pub use seal::{is_marked, sealed};
+pub use seal::{is_marked, seal_text};
 pub use streams::{
     Encoder, GaugeStream, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams,
 };
 pub use transforms::{Chain, Transforms};
-pub use url::{is_url, list, resolve};
+pub use url::{is_url, list_objects, resolve_path};
 
 #[cfg(test)]
 mod tests;

@@ -12,12 +12,12 @@ const KEPT: usize = 1000;
 static LOSSES: Mutex<Vec<Warning>> = Mutex::new(Vec::new());
 
 /// Every warning that data of a recording were lost, once, in the order in which they were found.
-pub fn losses() -> Vec<Warning> {
+pub fn data_loss_warnings() -> Vec<Warning> {
     lock().clone()
 }
 
 /// Notes those of a report.
-pub(crate) fn note(warnings: &[Warning]) {
+pub(crate) fn add_warnings(warnings: &[Warning]) {
     let mut known = lock();
     for warning in warnings.iter().filter(|w| w.severity == Severity::DataLost) {
         if known.len() < KEPT && !known.contains(warning) {

@@ -10,7 +10,7 @@
 use crate::index::{self, Found};
 use crate::ranges::Ranged;
 use crate::raw::{Attachment, parse_metadata};
-use crate::seal::{Seal, comment, kind};
+use crate::seal::{Seal, mark_comment, parse_kind};
 use crate::{EXTRACT_METADATA, RecordingError, input};
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
@@ -103,7 +103,7 @@ impl Mark {
 
     /// The mark of a file; `None` for one that armcal did not make.
     pub fn of_file(path: &Path) -> io::Result<Option<Mark>> {
-        let mut file = input::regular(path)?;
+        let mut file = input::open_regular(path)?;
         let mut head = Vec::new();
         file.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
         if head.starts_with(mcap::MAGIC) {
@@ -113,7 +113,7 @@ impl Mark {
             return of_parquet(&mut file);
         }
         let mut mark = Mark::of_text(&head);
-        if let (Some(mark), Some(comment)) = (&mut mark, comment(valid(&head))) {
+        if let (Some(mark), Some(comment)) = (&mut mark, mark_comment(valid_utf8(&head))) {
             mark.seal = comment.seal(&head, file)?;
         }
         Ok(mark)
@@ -124,16 +124,16 @@ impl Mark {
         let head = String::from_utf8_lossy(head);
         let holds = |(_, begins, part): &&(&str, &str, &str)| head.starts_with(begins) && head.contains(part);
         let signed = || SIGNATURES.iter().find(holds).map(|(kind, ..)| (*kind).to_owned());
-        of_schema(&head).or_else(|| Some(comment(&head)?.kind)).or_else(signed).map(unsealed)
+        of_schema(&head).or_else(|| Some(mark_comment(&head)?.kind)).or_else(signed).map(unsealed_mark)
     }
 }
 
-fn unsealed(kind: String) -> Mark {
+fn unsealed_mark(kind: String) -> Mark {
     Mark { kind, seal: Seal::None }
 }
 
 /// The text that bytes begin with.
-fn valid(bytes: &[u8]) -> &str {
+fn valid_utf8(bytes: &[u8]) -> &str {
     let end = std::str::from_utf8(bytes).map_or_else(|e| e.valid_up_to(), str::len);
     std::str::from_utf8(&bytes[..end]).unwrap_or_default()
 }
@@ -142,7 +142,7 @@ fn valid(bytes: &[u8]) -> &str {
 fn of_schema(head: &str) -> Option<String> {
     let key = head.trim_start().strip_prefix('{')?.trim_start().strip_prefix("\"schema\"")?;
     let word = key.trim_start().strip_prefix(':')?.trim_start().strip_prefix("\"armcal.")?;
-    kind(word).map(|(kind, _)| kind)
+    parse_kind(word).map(|(kind, _)| kind)
 }
 
 fn of_mcap(file: File, path: &Path) -> Result<Option<Mark>, RecordingError> {
@@ -163,7 +163,7 @@ fn of_mcap(file: File, path: &Path) -> Result<Option<Mark>, RecordingError> {
         && names.is_empty()
         && channels.all(|(_, channel)| channel.topic.starts_with("/joint_set_points"));
     let earlier = || set_points.then_some(&RECORDS[2]);
-    Ok(RECORDS.iter().find(borne).or_else(earlier).map(|(_, kind)| unsealed((*kind).to_owned())))
+    Ok(RECORDS.iter().find(borne).or_else(earlier).map(|(_, kind)| unsealed_mark((*kind).to_owned())))
 }
 
 fn of_parquet(file: &mut File) -> io::Result<Option<Mark>> {
@@ -183,10 +183,10 @@ fn of_parquet(file: &mut File) -> io::Result<Option<Mark>> {
     let mut footer = Vec::new();
     file.take(footer_bytes).read_to_end(&mut footer)?;
     let footer = String::from_utf8_lossy(&footer);
-    let said = footer.match_indices("armcal.").find_map(|(at, word)| kind(&footer[at + word.len()..]));
+    let said = footer.match_indices("armcal.").find_map(|(at, word)| parse_kind(&footer[at + word.len()..]));
     let said = said.map(|(kind, _)| kind);
     let has = |(_, columns): &&(&str, [&str; 2])| columns.iter().all(|column| footer.contains(column));
-    Ok(said.or_else(|| TABLES.iter().find(has).map(|(kind, _)| (*kind).to_owned())).map(unsealed))
+    Ok(said.or_else(|| TABLES.iter().find(has).map(|(kind, _)| (*kind).to_owned())).map(unsealed_mark))
 }
 
 /// Whether the `run.mcap` beside a file has just this file attached: so earlier versions, which did not mark every file,
@@ -198,9 +198,9 @@ pub(crate) fn attached_to_run(path: &Path) -> Result<bool, RecordingError> {
         return Ok(false);
     }
     let mut bytes = Vec::new();
-    input::regular(path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(read)?;
+    input::open_regular(path).and_then(|mut file| file.read_to_end(&mut bytes)).map_err(read)?;
     let name = format!("armcal/{}", path.file_name().unwrap_or_default().to_string_lossy());
-    let ranged = Ranged::local(input::regular(&beside).map_err(read)?, &beside)?;
+    let ranged = Ranged::local(input::open_regular(&beside).map_err(read)?, &beside)?;
     let Found::Layout(layout) = index::find(&ranged)? else { return Ok(false) };
     for range in &layout.attachments {
         let body = ranged.read_one(range.clone())?;

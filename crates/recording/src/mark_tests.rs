@@ -49,7 +49,7 @@ fn texts_of_armcal_are_known_and_others_are_not() {
 #[test]
 fn a_page_of_an_earlier_version_gives_way_to_pages_only() {
     let [earlier, report, summary, other] =
-        ["page", "report-page", "summary", "comparison-page"].map(|kind| unsealed(kind.to_owned()));
+        ["page", "report-page", "summary", "comparison-page"].map(|kind| unsealed_mark(kind.to_owned()));
     assert!(report.replaces(&earlier) && report.replaces(&report));
     assert!(!summary.replaces(&earlier) && !report.replaces(&other) && !earlier.replaces(&report));
 }
@@ -97,7 +97,7 @@ fn a_recording_of_armcal_is_what_its_records_make_it() {
 fn a_file_without_a_mark_is_known_by_the_run_that_has_it_attached() {
     let folder = tempfile::tempdir().expect("a folder");
     let model = folder.path().join("calibrated.toml");
-    let new = crate::sealed("# armcal.calibrated-model/1\nname = 'new'\n");
+    let new = crate::seal_text("# armcal.calibrated-model/1\nname = 'new'\n");
     let new = new.as_bytes();
     write_mcap(
         &folder.path().join("run.mcap"),
@@ -117,7 +117,7 @@ fn inputs_are_never_written_over_whatever_they_are() {
     let folder = tempfile::tempdir().expect("a folder");
     let [ours, link, hard, later] =
         ["a.toml", "b.toml", "c.toml", "d.toml"].map(|name| folder.path().join(name));
-    let text = crate::sealed("# armcal.test/1\none\n");
+    let text = crate::seal_text("# armcal.test/1\none\n");
     let text = text.as_bytes();
     atomic::write(&ours, text).expect("written");
     atomic::write(&ours, b"# armcal.test/1\ntwo\n").expect("its own kind");
@@ -125,7 +125,7 @@ fn inputs_are_never_written_over_whatever_they_are() {
     begun.write_all(text).expect("written");
     assert_eq!(
         input::read_to_string(&ours, input::Kind::Text).expect("readable"),
-        crate::sealed("# armcal.test/1\ntwo\n")
+        crate::seal_text("# armcal.test/1\ntwo\n")
     );
     std::os::unix::fs::symlink(&ours, &link).expect("linked");
     std::fs::hard_link(&ours, &hard).expect("linked");

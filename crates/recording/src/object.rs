@@ -30,10 +30,10 @@ const RETRY_FOR: Duration = Duration::from_secs(60);
 /// Opens an object; one request brings its size, its identity and its end.
 pub(crate) fn open(url: &str, location: &Location) -> Result<Ranged, RecordingError> {
     let failed = |why: String| RecordingError::Object { url: url.to_owned(), why };
-    let store = store(url, &location.bucket)?;
+    let store = build_store(url, &location.bucket)?;
     let key = Key::parse(&location.key).map_err(|e| failed(format!("its key cannot be used: {e}")))?;
     let options = GetOptions { range: Some(GetRange::Suffix(TAIL_BYTES)), ..GetOptions::default() };
-    let tail = wait(url, async {
+    let tail = run_request(url, async {
         match store.get_opts(&key, options).await {
             Ok(found) => whole(found).await,
             // An empty object has no last byte to ask for.
@@ -43,7 +43,7 @@ pub(crate) fn open(url: &str, location: &Location) -> Result<Ranged, RecordingEr
             },
         }
     })?;
-    let (meta, bytes) = tail.map_err(|e| failed(explain(&e, location)))?;
+    let (meta, bytes) = tail.map_err(|e| failed(explain_error(&e, location)))?;
     if meta.size == 0 {
         return Err(RecordingError::NotMcap { path: url.into(), why: "the object is empty".into() });
     }
@@ -59,10 +59,10 @@ pub(crate) fn open(url: &str, location: &Location) -> Result<Ranged, RecordingEr
 pub(crate) fn keys(url: &str, bucket: &str, folder: &str) -> Result<Vec<String>, RecordingError> {
     let location = Location { bucket: bucket.to_owned(), key: folder.to_owned() };
     let failed = |why: String| RecordingError::Object { url: url.to_owned(), why };
-    let store = store(url, bucket)?;
+    let store = build_store(url, bucket)?;
     let folder = Key::parse(folder).map_err(|e| failed(format!("its key cannot be used: {e}")))?;
-    let found: Result<Vec<ObjectMeta>, Error> = wait(url, store.list(Some(&folder)).try_collect())?;
-    let found = found.map_err(|e| failed(explain(&e, &location)))?;
+    let found: Result<Vec<ObjectMeta>, Error> = run_request(url, store.list(Some(&folder)).try_collect())?;
+    let found = found.map_err(|e| failed(explain_error(&e, &location)))?;
     Ok(found.into_iter().map(|meta| meta.location.to_string()).collect())
 }
 
@@ -88,8 +88,8 @@ impl ReadRanges for Object {
             Ok::<_, Error>((range, bytes))
         };
         let requests = futures_util::stream::iter(ranges.iter().cloned()).map(get).buffered(IN_FLIGHT);
-        let answers: Result<Vec<_>, Error> = wait(&self.url, requests.try_collect())?;
-        let answers = answers.map_err(|e| failed(explain(&e, &self.location)))?;
+        let answers: Result<Vec<_>, Error> = run_request(&self.url, requests.try_collect())?;
+        let answers = answers.map_err(|e| failed(explain_error(&e, &self.location)))?;
         let whole = |(range, bytes): (Range<u64>, Bytes)| {
             let wanted = range.end - range.start;
             let short = || {
@@ -106,7 +106,7 @@ async fn whole(found: GetResult) -> Result<(ObjectMeta, Bytes), Error> {
     Ok((meta, found.bytes().await?))
 }
 
-fn store(url: &str, bucket: &str) -> Result<AmazonS3, RecordingError> {
+fn build_store(url: &str, bucket: &str) -> Result<AmazonS3, RecordingError> {
     let retry = RetryConfig { max_retries: RETRIES, retry_timeout: RETRY_FOR, ..RetryConfig::default() };
     AmazonS3Builder::from_env().with_bucket_name(bucket).with_retry(retry).build().map_err(|e| {
         let why = format!("the store cannot be set up: {}; check the AWS_* variables", with_causes(&e));
@@ -115,7 +115,7 @@ fn store(url: &str, bucket: &str) -> Result<AmazonS3, RecordingError> {
 }
 
 /// Runs a request to its end on the runtime of this module.
-fn wait<F: Future + Send>(url: &str, request: F) -> Result<F::Output, RecordingError>
+fn run_request<F: Future + Send>(url: &str, request: F) -> Result<F::Output, RecordingError>
 where
     F::Output: Send,
 {
@@ -136,7 +136,7 @@ where
 }
 
 /// What went wrong, and what to do.
-fn explain(error: &Error, location: &Location) -> String {
+fn explain_error(error: &Error, location: &Location) -> String {
     let (Location { bucket, key }, said) = (location, with_causes(error));
     let elsewhere = ["redirect without LOCATION", "PermanentRedirect", "AuthorizationHeaderMalformed"];
     match error {

@@ -9,7 +9,7 @@ use crate::foreign::{self, Converted, DEFINITION_FROM};
 use crate::index::{self, Found};
 use crate::layout::Layout;
 use crate::raw::{RawChannel, RawSchema};
-use crate::sweep::{At, BlockSurvey, FileSurvey, Tally, sweep, together};
+use crate::sweep::{At, BlockSurvey, FileSurvey, Tally, blocks_within_budget, sweep};
 use crate::{
     ChannelReport, Fetched, FileReport, ObjectIdentity, RecordingError, RecordingReport, Source, bag, decode,
     losses, witness,
@@ -232,7 +232,7 @@ impl Recording {
                 streams: Vec::new(),
                 warnings: per_file().flat_map(|((f, _), damage)| f.warnings(damage)).collect(),
             };
-            losses::note(&report.warnings);
+            losses::add_warnings(&report.warnings);
             JudgedFiles { report, unread }
         })
     }
@@ -275,7 +275,7 @@ impl Recording {
             let mut left = &unread[..];
             while !left.is_empty() {
                 let now;
-                (now, left) = left.split_at(together(&self.files, left, most));
+                (now, left) = left.split_at(blocks_within_budget(&self.files, left, most));
                 let (found, _) = sweep(self, now, |_| (), |(), _, _| ())?;
                 self.remember(found);
                 let surveys = self.surveys.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -308,9 +308,9 @@ impl Recording {
             found.extend(file.channels().map(|(id, channel)| (&**channel, file.tally(survey, &unread, id))));
         }
         // The same channel of several files, or of several numbers, is one.
-        found.sort_by_key(|(channel, _)| named(channel));
+        found.sort_by_key(|(channel, _)| channel_key(channel));
         found.dedup_by(|(channel, more), (before, tally)| {
-            let same = named(channel) == named(before);
+            let same = channel_key(channel) == channel_key(before);
             if let Some(more) = more.filter(|_| same) {
                 tally.get_or_insert(Tally { messages: 0, ..more }).add(more);
             }
@@ -330,8 +330,8 @@ impl Recording {
                 schema_encoding: schema.map_or(&none, |schema| &schema.encoding).clone(),
                 message_encoding: channel.message_encoding.clone(),
                 messages: tally.messages,
-                first_ns: ns(tally.first_ns),
-                last_ns: ns(tally.last_ns),
+                first_ns: saturating_ns(tally.first_ns),
+                last_ns: saturating_ns(tally.last_ns),
                 decodable: known.entry(compiled).or_insert_with(|| readable_as(channel)).clone(),
             }
         };
@@ -516,7 +516,7 @@ impl RecordingFile {
 }
 
 /// Log times are unsigned in MCAP; beyond the year 2262 they saturate.
-pub(crate) fn ns(unsigned: u64) -> i64 {
+pub(crate) fn saturating_ns(unsigned: u64) -> i64 {
     i64::try_from(unsigned).unwrap_or(i64::MAX)
 }
 
@@ -524,7 +524,7 @@ pub(crate) fn ns(unsigned: u64) -> i64 {
 type Compiled<'a> = (Option<*const RawSchema>, &'a str);
 
 /// What makes channels one in a report: topic, schema, its encoding, that of the messages.
-fn named(channel: &RawChannel) -> [&str; 4] {
+fn channel_key(channel: &RawChannel) -> [&str; 4] {
     let (schema, encoding) = channel.schema.as_ref().map_or(("", ""), |s| (&*s.name, &*s.encoding));
     [&channel.topic, schema, encoding, &channel.message_encoding]
 }

@@ -47,7 +47,7 @@ impl McapOutput {
             .chunk_size(Some(CHUNK_BYTES));
         match options.create(BufWriter::new(file)) {
             Ok(writer) => Ok(McapOutput { writer, path: path.to_owned() }),
-            Err(e) => Err(failed(path, &e)),
+            Err(e) => Err(write_error(path, &e)),
         }
     }
 
@@ -120,12 +120,12 @@ impl McapOutput {
     }
 
     fn failed(&self, error: &mcap::McapError) -> RecordingError {
-        failed(&self.path, error)
+        write_error(&self.path, error)
     }
 }
 
 /// What the system refused is the cause of a refusal to write: a full disk is "Record parse failed" to the library.
-fn failed(path: &Path, error: &mcap::McapError) -> RecordingError {
+fn write_error(path: &Path, error: &mcap::McapError) -> RecordingError {
     let why = error.source().map_or_else(|| error.to_string(), ToString::to_string);
     RecordingError::Write { path: path.to_owned(), why }
 }

@@ -2,8 +2,8 @@
 
 use crate::clean::Kept;
 use crate::decode::PoseRow;
-use crate::error::nearest;
-use crate::gather::{Request, joined};
+use crate::error::nearest_name;
+use crate::gather::{Request, concat_parts};
 use crate::occlusion::Seen;
 use crate::{LengthUnit, PoseStream, RecordingError};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -46,7 +46,7 @@ impl PoseTable {
             whole.other_frames.append(&mut part.other_frames);
             part.seen
         });
-        let seen = joined(each.collect());
+        let seen = concat_parts(each.collect());
         PoseTable { seen, ..whole }
     }
 
@@ -93,7 +93,7 @@ pub(crate) fn body_missing(
     present: &BTreeSet<String>,
 ) -> RecordingError {
     let wanted = stream.body.as_deref().unwrap_or_default();
-    missing((role, stream), wanted, format!("never shows body {wanted:?}"), present)
+    body_error((role, stream), wanted, format!("never shows body {wanted:?}"), present)
 }
 
 /// The error for a frame that no pose is in.
@@ -105,7 +105,7 @@ pub(crate) fn frame_missing(
     let wanted = stream.frame.as_deref().unwrap_or_default();
     let why =
         format!("never has that body in frame {wanted:?}, and no transform joins that frame to another");
-    missing((role, stream), wanted, why, present)
+    body_error((role, stream), wanted, why, present)
 }
 
 /// The error for a frame that no transforms lead to.
@@ -117,7 +117,7 @@ pub(crate) fn no_chain(request: &Request<'_>, why: String) -> RecordingError {
     }
 }
 
-fn missing(
+fn body_error(
     (role, stream): (&'static str, &PoseStream),
     wanted: &str,
     why: String,
@@ -127,7 +127,7 @@ fn missing(
         role,
         topic: stream.topic.clone(),
         why,
-        nearest: nearest(wanted, present),
+        nearest: nearest_name(wanted, present),
         present: present.iter().cloned().collect(),
     }
 }
@@ -186,7 +186,7 @@ pub(crate) fn looks_like_metres(stream: &PoseStream, position_m: &[Vector3<f64>]
 }
 
 /// Positions [m] of the given rows.
-pub(crate) fn positions(table: &PoseTable, rows: &Kept) -> Vec<Vector3<f64>> {
+pub(crate) fn positions_m(table: &PoseTable, rows: &Kept) -> Vec<Vector3<f64>> {
     rows.file_rows().map(|i| Vector3::from(table.seen[i].position_m)).collect()
 }
 

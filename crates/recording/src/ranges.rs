@@ -1,6 +1,6 @@
 //! Bytes of a file that are read by range, on demand: an object in a store, or a local file that is not mapped.
 
-use crate::identity::named;
+use crate::identity::prefixed_hash;
 use crate::map::Map;
 use crate::{Fetched, ObjectIdentity, RecordingError};
 use bytes::Bytes;
@@ -118,7 +118,7 @@ impl Ranged {
             left -= covered;
             Ok(())
         })?;
-        Ok((named(hasher.finalize()), Some(crc.finalize())))
+        Ok((prefixed_hash(hasher.finalize()), Some(crc.finalize())))
     }
 
     /// Hands the file to `f` in order, some pieces at a time in memory.

@@ -2,7 +2,10 @@
 
 use crate::open::RecordingFile;
 use crate::records::{Cursor, Message};
-use crate::sweep::{Batch, BlockSurvey, blocks, for_each_batch, inflate, records, together};
+use crate::sweep::{
+    Batch, BlockSurvey, block_records, blocks_for_channels, blocks_within_budget, for_each_batch,
+    inflate_block,
+};
 use crate::{Recording, RecordingError};
 use mcap::records::op;
 use rayon::prelude::*;
@@ -109,7 +112,7 @@ impl Recording {
             file.channels().filter(|(_, channel)| wanted(channel)).map(|(id, _)| id).collect()
         };
         let ids: Vec<BTreeSet<u16>> = self.files.iter().map(ids).collect();
-        let blocks = blocks(&self.files, &ids);
+        let blocks = blocks_for_channels(&self.files, &ids);
         self.pays(&blocks)?;
         let done = for_each_batch(&self.files, &blocks, |batch| self.hand_out(&batch, &ids, f));
         self.files.iter().try_for_each(RecordingFile::unshortened)?;
@@ -126,17 +129,17 @@ impl Recording {
         let ahead = 2 * rayon::current_num_threads();
         let (mut blocks_left, mut fetched_left) = (batch.blocks, &batch.fetched[..]);
         while !blocks_left.is_empty() {
-            let count = together(&self.files, blocks_left, ahead);
+            let count = blocks_within_budget(&self.files, blocks_left, ahead);
             let (blocks, fetched);
             (blocks, blocks_left) = blocks_left.split_at(count);
             (fetched, fetched_left) = fetched_left.split_at(count);
             let work = blocks.par_iter().zip(fetched);
             let inflated: Vec<(Vec<u8>, BlockSurvey)> =
-                work.map(|(at, fetched)| inflate(&self.files, *at, fetched.as_ref())).collect();
+                work.map(|(at, fetched)| inflate_block(&self.files, *at, fetched.as_ref())).collect();
             let mut surveys = Vec::with_capacity(inflated.len());
             for (bytes, (at, survey)) in inflated {
                 let file = &self.files[at.file];
-                let messages = records(&bytes).filter(|r| r.op == op::MESSAGE);
+                let messages = block_records(&bytes).filter(|r| r.op == op::MESSAGE);
                 for message in messages.filter_map(|r| Message::parse(r.body)) {
                     if !ids[at.file].contains(&message.channel_id) {
                         continue;

@@ -1,6 +1,6 @@
 //! The streams of a pipeline, read into columns.
 
-use crate::gather::{Gathered, Kind, Request, gather};
+use crate::gather::{Gathered, Kind, Request, gather_streams};
 use crate::open::RecordingFile;
 use crate::reading::{Columns, Reading};
 use crate::streams::field_of;
@@ -39,8 +39,8 @@ impl Recording {
         let named = [("tip", &streams.tip), ("base", &streams.base), ("table", &streams.table)];
         let named = named.into_iter().filter_map(|(role, stream)| Some((role, stream.as_ref()?)));
         named.chain(streams.bodies.values().map(|s| ("bodies", s))).try_for_each(poses::check_config)?;
-        let requests = requests(streams);
-        let mut gathered = gather(self, &requests)?;
+        let requests = stream_requests(streams);
+        let mut gathered = gather_streams(self, &requests)?;
         let chains = self.chains(&requests, &mut gathered)?;
         let read = |((place, request), gathered): ((usize, &Request<'_>), Gathered)| {
             let mut stage = Reading::new(request, gathered, chains.get(&place));
@@ -104,14 +104,14 @@ impl Recording {
             let kind = Kind::Pose { body: Some(child), frame: Some(parent), unit: *unit };
             moving.push(Request { topic, kind, ..requests[*place].clone() });
         }
-        for ((place, ..), moving) in found.iter().zip(gather(self, &moving)?) {
+        for ((place, ..), moving) in found.iter().zip(gather_streams(self, &moving)?) {
             gathered[*place] = moving;
         }
         Ok(found.into_iter().map(|(place, _, chain)| (place, chain)).collect())
     }
 }
 
-fn requests(streams: &Streams) -> Vec<Request<'_>> {
+fn stream_requests(streams: &Streams) -> Vec<Request<'_>> {
     let joints = streams.joints.iter().map(|s| ("joints", s));
     let joints = joints.chain(streams.set_points.iter().map(|s| ("set_points", s)));
     let mut requests: Vec<Request<'_>> = joints

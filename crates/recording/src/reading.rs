@@ -1,7 +1,7 @@
 //! One stream on its way from rows to columns: its clock, its order, its units, and what of it is dropped.
 
 use crate::clean::{Counts, Kept, drop_duplicates, in_time_order, rate_and_gap};
-use crate::clock::{choose, drop_stray, judge_header};
+use crate::clock::{choose_clock, drop_stray, judge_header};
 use crate::gather::{Gathered, Request};
 use crate::occlusion::{Verdict, reject_frozen, reject_unseen};
 use crate::temperature::{Scale, like_fahrenheit};
@@ -102,7 +102,7 @@ impl Reading<'_> {
         let mut joint_rad = rows.of_columns(table.position);
         joints::to_rad(&mut joint_rad, stream);
         joints::check_unit(&joint_rad, stream)?;
-        if let Some(possible) = joints::possible(&joint_rad, stream) {
+        if let Some(possible) = joints::possible_row_mask(&joint_rad, stream) {
             for column in &mut joint_rad {
                 let mut place = 0..;
                 column.retain(|_| place.next().is_some_and(|place: usize| possible[place]));
@@ -110,7 +110,7 @@ impl Reading<'_> {
             let mut place = 0..;
             self.drop_impossible(&mut rows, |_| place.next().is_some_and(|place: usize| possible[place]));
         }
-        let effort_nm = joints::effort(rows.of_columns(table.effort));
+        let effort_nm = joints::recorded_effort(rows.of_columns(table.effort));
         let time_ns = rows.time_ns;
         self.finish(role, &time_ns, counts)?;
         self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
@@ -139,7 +139,7 @@ impl Reading<'_> {
         drop_duplicates(&mut rows, &mut counts);
         occluded.frozen = reject_frozen(&mut rows, &table.seen);
         self.report.occluded = occluded;
-        let position_m = poses::positions(&table, &rows);
+        let position_m = poses::positions_m(&table, &rows);
         let orientation = oriented.then(|| poses::orientations(&table, &rows)).flatten();
         let time_ns = rows.time_ns;
         self.finish(role, &time_ns, counts)?;
@@ -246,7 +246,7 @@ impl Reading<'_> {
     fn time(&mut self, role: &'static str, asked: Option<Clock>) -> Result<Vec<Option<i64>>, RecordingError> {
         let mut stamps = std::mem::take(&mut self.gathered.stamps);
         let (clock, why) = match asked {
-            None => choose(&stamps),
+            None => choose_clock(&stamps),
             Some(clock) => (clock, "set in the pipeline".to_owned()),
         };
         let unset = clock == Clock::Header && !stamps.header_ns.iter().flatten().any(|ns| *ns > 0);
@@ -356,14 +356,26 @@ impl Reading<'_> {
         self.counted(note, "other-joints", r.other_joints, "messages without all wanted joints skipped");
         for why in &self.gathered.unreadable {
             let text = format!("another channel of this topic is not read: {why}");
-            self.warnings.push(Warning::new(note, Stage::Recording, "channel-unreadable", subject(&r), text));
+            self.warnings.push(Warning::new(
+                note,
+                Stage::Recording,
+                "channel-unreadable",
+                warning_subject(&r),
+                text,
+            ));
         }
     }
 
     fn counted(&mut self, severity: Severity, code: &'static str, count: u64, what: &str) {
         if count > 0 {
             let text = format!("{count} {what}");
-            self.warnings.push(Warning::new(severity, Stage::Recording, code, subject(&self.report), text));
+            self.warnings.push(Warning::new(
+                severity,
+                Stage::Recording,
+                code,
+                warning_subject(&self.report),
+                text,
+            ));
         }
     }
 
@@ -374,10 +386,16 @@ impl Reading<'_> {
     }
 
     fn say(&mut self, severity: Severity, code: &'static str, text: String) {
-        self.warnings.push(Warning::new(severity, Stage::Recording, code, subject(&self.report), text));
+        self.warnings.push(Warning::new(
+            severity,
+            Stage::Recording,
+            code,
+            warning_subject(&self.report),
+            text,
+        ));
     }
 }
 
-fn subject(report: &StreamReport) -> String {
+fn warning_subject(report: &StreamReport) -> String {
     format!("stream {} ({})", report.role, report.topic)
 }

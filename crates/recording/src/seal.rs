@@ -40,12 +40,12 @@ pub(crate) struct Comment {
 }
 
 /// The comment in the first lines of a text that says what armcal made it as.
-pub(crate) fn comment(head: &str) -> Option<Comment> {
+pub(crate) fn mark_comment(head: &str) -> Option<Comment> {
     let mut at = 0;
     for line in head.split_inclusive('\n').take(HEAD_LINES) {
         for (begins, seals) in COMMENTS {
             let word = line.strip_prefix(begins);
-            if let Some((kind, bytes)) = word.and_then(kind) {
+            if let Some((kind, bytes)) = word.and_then(parse_kind) {
                 let seal_at = seals.then_some(at + begins.len() + bytes);
                 return Some(Comment { kind, seal_at });
             }
@@ -56,7 +56,7 @@ pub(crate) fn comment(head: &str) -> Option<Comment> {
 }
 
 /// `KIND` of `KIND/N...`, and how many bytes `KIND/N` has.
-pub(crate) fn kind(text: &str) -> Option<(String, usize)> {
+pub(crate) fn parse_kind(text: &str) -> Option<(String, usize)> {
     let (kind, version) = text.split_once('/')?;
     let plain = !kind.is_empty() && kind.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_".contains(&b));
     let digits = version.bytes().take_while(u8::is_ascii_digit).count();
@@ -64,16 +64,16 @@ pub(crate) fn kind(text: &str) -> Option<(String, usize)> {
 }
 
 /// A text whose mark says what the rest of it is; one without a mark, or of a form that has no hash, as it is.
-pub fn sealed(text: &str) -> Cow<'_, str> {
-    let Some(at) = comment(text).and_then(|comment| comment.seal_at) else { return Cow::Borrowed(text) };
+pub fn seal_text(text: &str) -> Cow<'_, str> {
+    let Some(at) = mark_comment(text).and_then(|comment| comment.seal_at) else { return Cow::Borrowed(text) };
     let (before, after) = text.split_at(at);
     let after = &after[of_word(after.as_bytes()).map_or(0, <[u8]>::len)..];
-    Cow::Owned(format!("{before}{WORD}{}{after}", hash([before.as_bytes(), after.as_bytes()])))
+    Cow::Owned(format!("{before}{WORD}{}{after}", hash_parts([before.as_bytes(), after.as_bytes()])))
 }
 
 /// The same of bytes, which stay as they are where they are no text.
 pub(crate) fn sealed_bytes(bytes: &[u8]) -> Cow<'_, [u8]> {
-    match std::str::from_utf8(bytes).map(sealed) {
+    match std::str::from_utf8(bytes).map(seal_text) {
         Ok(Cow::Owned(text)) => Cow::Owned(text.into_bytes()),
         _ => Cow::Borrowed(bytes),
     }
@@ -81,7 +81,7 @@ pub(crate) fn sealed_bytes(bytes: &[u8]) -> Cow<'_, [u8]> {
 
 /// Whether a text has a mark that can carry a hash.
 pub fn is_marked(text: &str) -> bool {
-    comment(text).is_some_and(|comment| comment.seal_at.is_some())
+    mark_comment(text).is_some_and(|comment| comment.seal_at.is_some())
 }
 
 impl Comment {
@@ -103,7 +103,7 @@ impl Comment {
                 Err(e) => return Err(e),
             }
         }
-        let now = digits(hasher);
+        let now = hash_digits(hasher);
         Ok(if word.ends_with(now.as_bytes()) { Seal::Whole } else { Seal::Broken })
     }
 }
@@ -115,13 +115,13 @@ fn of_word(text: &[u8]) -> Option<&[u8]> {
         .then_some(word)
 }
 
-fn hash<const N: usize>(parts: [&[u8]; N]) -> String {
+fn hash_parts<const N: usize>(parts: [&[u8]; N]) -> String {
     let mut hasher = Sha256::new();
     parts.iter().for_each(|part| hasher.update(part));
-    digits(hasher)
+    hash_digits(hasher)
 }
 
-fn digits(hasher: Sha256) -> String {
+fn hash_digits(hasher: Sha256) -> String {
     let mut digits = hex::encode(hasher.finalize());
     digits.truncate(DIGITS);
     digits
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     fn seal(text: &str) -> Seal {
-        comment(text).map_or(Seal::None, |c| c.seal(text.as_bytes(), io::empty()).expect("read"))
+        mark_comment(text).map_or(Seal::None, |c| c.seal(text.as_bytes(), io::empty()).expect("read"))
     }
 
     #[test]
@@ -142,20 +142,20 @@ mod tests {
             "<?xml version=\"1.0\"?>\n<!-- armcal.calibrated-model/12 -->\n<robot/>\n",
             "# armcal.board/1\n",
         ] {
-            let whole = sealed(text).into_owned();
+            let whole = seal_text(text).into_owned();
             assert_eq!(whole.len(), text.len() + WORD.len() + DIGITS, "{whole}");
             assert_eq!((seal(text), seal(&whole)), (Seal::None, Seal::Whole), "{whole}");
-            assert_eq!(sealed(&whole), whole, "sealed twice");
+            assert_eq!(seal_text(&whole), whole, "sealed twice");
             for changed in [whole.clone() + "\n", whole.replacen("armcal.", "armcal.x", 1)] {
                 assert_eq!(seal(&changed), Seal::Broken, "{changed}");
-                assert_eq!(seal(&sealed(&changed)), Seal::Whole, "{changed}");
+                assert_eq!(seal(&seal_text(&changed)), Seal::Whole, "{changed}");
             }
             let (head, rest) = whole.as_bytes().split_at(whole.len() - 1);
-            let parted = comment(&whole).expect("a mark").seal(head, rest);
+            let parted = mark_comment(&whole).expect("a mark").seal(head, rest);
             assert_eq!(parted.expect("read"), Seal::Whole, "{whole}");
         }
         for plain in ["name = 'a'\n", "{\"schema\": \"armcal.summary/1\"}", ".\\\" armcal.man/1\n", ""] {
-            assert_eq!(sealed(plain), plain);
+            assert_eq!(seal_text(plain), plain);
         }
     }
 }

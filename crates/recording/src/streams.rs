@@ -98,7 +98,7 @@ impl JointStream {
 
     /// The fields that the pipeline names, by their paths; the positions come first.
     pub(crate) fn fields(&self) -> Vec<(Place, &str)> {
-        paths([
+        configured_paths([
             (Place::Positions, &self.position),
             (Place::Names, &self.name),
             (Place::Efforts, &self.effort),
@@ -214,11 +214,11 @@ pub struct PoseStream {
 impl PoseStream {
     /// The fields that the pipeline names, by their paths; the position comes first.
     pub(crate) fn fields(&self) -> Vec<(Place, &str)> {
-        paths([(Place::Position, &self.position), (Place::Orientation, &self.orientation)])
+        configured_paths([(Place::Position, &self.position), (Place::Orientation, &self.orientation)])
     }
 }
 
-fn paths<const N: usize>(fields: [(Place, &Option<String>); N]) -> Vec<(Place, &str)> {
+fn configured_paths<const N: usize>(fields: [(Place, &Option<String>); N]) -> Vec<(Place, &str)> {
     fields.into_iter().filter_map(|(place, path)| Some((place, path.as_deref()?))).collect()
 }
 
@@ -265,7 +265,7 @@ pub struct GaugeStream {
 
 /// The one field of a message of one number, if the pipeline names it.
 pub(crate) fn field_of(value: &Option<String>) -> Vec<(Place, &str)> {
-    paths([(Place::Value, value)])
+    configured_paths([(Place::Value, value)])
 }
 
 fn millimetres() -> LengthUnit {

@@ -8,8 +8,8 @@ use crate::bytes::FileBytes;
 use crate::channels::Definitions;
 use crate::chunk::Inflater;
 use crate::damage::Faults;
-use crate::index::holding;
-use crate::judge::{Judged, judged};
+use crate::index::candidate_blocks;
+use crate::judge::{Judged, judge_block};
 use crate::open::RecordingFile;
 use crate::records::{Message, RawRecord, Records};
 use crate::{Recording, RecordingError};
@@ -30,11 +30,11 @@ pub(crate) struct At {
 }
 
 /// The blocks to pass over for these channels of each file, in file order.
-pub(crate) fn blocks(files: &[RecordingFile], wanted: &[BTreeSet<u16>]) -> Vec<At> {
+pub(crate) fn blocks_for_channels(files: &[RecordingFile], wanted: &[BTreeSet<u16>]) -> Vec<At> {
     let of_file = |((file, f), wanted): ((usize, &RecordingFile), &BTreeSet<u16>)| {
         let blocks = match f.bytes {
             FileBytes::Mapped(_) => (0..f.layout.blocks.len()).collect(),
-            FileBytes::Ranged(_) => holding(&f.layout.blocks, wanted),
+            FileBytes::Ranged(_) => candidate_blocks(&f.layout.blocks, wanted),
         };
         blocks.into_iter().map(move |block| At { file, block }).collect::<Vec<_>>()
     };
@@ -120,7 +120,7 @@ pub(crate) fn sweep<C: Send>(
         let range = file.layout.blocks[at.block].range();
         // Hashing streams through the bytes, and leaves them in the cache for inflating, which does not.
         file.bytes.hash(&range);
-        let judged = judged(file, at, fetched, inflater, &mut |message| each(collector, at, message));
+        let judged = judge_block(file, at, fetched, inflater, &mut |message| each(collector, at, message));
         let mut survey = judged.survey;
         recording.count(at, std::mem::take(&mut survey.tallies));
         inflater.done();
@@ -164,12 +164,12 @@ pub(crate) fn for_each_batch(
     blocks: &[At],
     mut work: impl FnMut(Batch<'_>) -> Result<(), RecordingError> + Send,
 ) -> Result<(), RecordingError> {
-    let mut batches = batches(files, blocks).into_iter();
-    let mut ready = batches.next().map(|batch| fetch(files, batch)).transpose()?;
+    let mut batches = split_batches(files, blocks).into_iter();
+    let mut ready = batches.next().map(|batch| fetch_batch(files, batch)).transpose()?;
     while let Some(batch) = ready {
         let next = batches.next();
         let (done, fetched) =
-            rayon::join(|| work(batch), || next.map(|batch| fetch(files, batch)).transpose());
+            rayon::join(|| work(batch), || next.map(|batch| fetch_batch(files, batch)).transpose());
         done?;
         ready = fetched?;
     }
@@ -177,7 +177,7 @@ pub(crate) fn for_each_batch(
 }
 
 /// Splits blocks: those of mapped files all at once, those of files read by ranges by size.
-fn batches<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Vec<&'a [At]> {
+fn split_batches<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Vec<&'a [At]> {
     let ranged = |at: &At| matches!(files[at.file].bytes, FileBytes::Ranged(_));
     let mut batches = Vec::new();
     let (mut from, mut bytes) = (0, 0);
@@ -196,7 +196,7 @@ fn batches<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Vec<&'a [At]> {
     batches
 }
 
-fn fetch<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Result<Batch<'a>, RecordingError> {
+fn fetch_batch<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Result<Batch<'a>, RecordingError> {
     let file = blocks.first().map(|at| &files[at.file]);
     let fetched = match file {
         Some(RecordingFile { bytes: FileBytes::Ranged(ranged), layout, .. }) => {
@@ -209,7 +209,7 @@ fn fetch<'a>(files: &[RecordingFile], blocks: &'a [At]) -> Result<Batch<'a>, Rec
 }
 
 /// How many blocks from the first on are held together: at most `most`, and within the budget.
-pub(crate) fn together(files: &[RecordingFile], blocks: &[At], most: usize) -> usize {
+pub(crate) fn blocks_within_budget(files: &[RecordingFile], blocks: &[At], most: usize) -> usize {
     let sums = blocks.iter().scan(0_u64, |sum, at| {
         *sum = sum.saturating_add(files[at.file].layout.blocks[at.block].held());
         Some(*sum)
@@ -218,12 +218,16 @@ pub(crate) fn together(files: &[RecordingFile], blocks: &[At], most: usize) -> u
 }
 
 /// The records of a block, held for passes that hand messages out in order, and the survey of it. A bad one is empty.
-pub(crate) fn inflate(files: &[RecordingFile], at: At, fetched: Option<&Bytes>) -> (Vec<u8>, BlockSurvey) {
+pub(crate) fn inflate_block(
+    files: &[RecordingFile],
+    at: At,
+    fetched: Option<&Bytes>,
+) -> (Vec<u8>, BlockSurvey) {
     let mut inflater = Inflater::default();
     let mut kept = Vec::new();
     let file = &files[at.file];
     let alone = file.layout.blocks[at.block].is_alone();
-    let Judged { survey, inflated } = judged(file, at, fetched, &mut inflater, &mut |message| {
+    let Judged { survey, inflated } = judge_block(file, at, fetched, &mut inflater, &mut |message| {
         // A large chunk is kept as it was inflated, and not copied.
         if !alone {
             message.write_to(&mut kept);
@@ -236,6 +240,6 @@ pub(crate) fn inflate(files: &[RecordingFile], at: At, fetched: Option<&Bytes>) 
 }
 
 /// The records of a block's bytes.
-pub(crate) fn records(bytes: &[u8]) -> impl Iterator<Item = RawRecord<'_>> {
+pub(crate) fn block_records(bytes: &[u8]) -> impl Iterator<Item = RawRecord<'_>> {
     Records::new(bytes, 0, bytes.len()).map_while(Result::ok)
 }

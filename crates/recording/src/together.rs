@@ -27,7 +27,7 @@ pub(crate) fn as_one(
     let slowest = (0..all.len()).fold(0, |slow, k| if period_s[k] > period_s[slow] { k } else { slow });
     let latest = |k: usize, time_ns: i64| {
         let latest = all[k].time_ns.partition_point(|t| *t <= time_ns).checked_sub(1)?;
-        let is_new = seconds(all[k].time_ns[latest], time_ns) <= OLDEST_PERIODS * period_s[k];
+        let is_new = seconds_between(all[k].time_ns[latest], time_ns) <= OLDEST_PERIODS * period_s[k];
         is_new.then_some(latest)
     };
     let rows = all[slowest].time_ns.iter();
@@ -68,7 +68,7 @@ fn check_overlap(streams: &[JointStream], all: &[JointSamples]) -> Result<(), Re
         Some(((ends, [_, end_ns]), (begins, [start_ns, _]))) if end_ns <= start_ns => refused(format!(
             "do not overlap: {} ends {:.1} s before {} begins",
             ends.called(),
-            seconds(*end_ns, *start_ns),
+            seconds_between(*end_ns, *start_ns),
             begins.called()
         )),
         _ => Ok(()),
@@ -76,11 +76,11 @@ fn check_overlap(streams: &[JointStream], all: &[JointSamples]) -> Result<(), Re
 }
 
 fn median_period_s(stream: &JointSamples) -> f64 {
-    let periods: Vec<f64> = stream.time_ns.windows(2).map(|w| seconds(w[0], w[1])).collect();
+    let periods: Vec<f64> = stream.time_ns.windows(2).map(|w| seconds_between(w[0], w[1])).collect();
     median(&periods)
 }
 
-fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+fn seconds_between(from_ns: i64, to_ns: i64) -> f64 {
     (i128::from(to_ns) - i128::from(from_ns)) as f64 * 1e-9
 }
 

@@ -4,7 +4,7 @@
 //! `T_1 T_2 .. T_n`, with `T_i` the transform where the way leads to a child and its inverse where it leads to a parent.
 //! Transforms that never change are constants; the stamps are those of the one that does.
 
-use crate::gather::{Kind, Request, can_read, gather};
+use crate::gather::{Kind, Request, can_read, gather_streams};
 use crate::occlusion::Seen;
 use crate::{LengthUnit, Recording, RecordingError};
 use armcal_core::{Pose, PoseSamples};
@@ -71,7 +71,7 @@ impl Recording {
         if !requests.iter().any(|r| topics.contains(&r.topic)) {
             return Ok(topics.iter().map(|_| Transforms::default()).collect());
         }
-        let gathered = gather(self, &requests)?;
+        let gathered = gather_streams(self, &requests)?;
         let on: BTreeMap<&str, Edges> =
             requests.iter().map(|r| r.topic).zip(gathered.into_iter().map(|g| g.edges)).collect();
         let tree = |(topic, beside): (&&str, &String)| {

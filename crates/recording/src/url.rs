@@ -1,6 +1,6 @@
 //! Recordings named by URL: `s3://bucket/key`, beside paths of local files.
 //!
-//! A URL travels through pipelines as a path like any other; only [`resolve`] and opening look at which it is. Object
+//! A URL travels through pipelines as a path like any other; only [`resolve_path`] and opening look at which it is. Object
 //! storage itself is in `object`, compiled with the feature `s3`.
 
 use crate::RecordingError;
@@ -20,7 +20,7 @@ pub fn is_url(path: &Path) -> bool {
 }
 
 /// A path written in a file of `folder`: relative ones start there, URLs and absolute ones stay.
-pub fn resolve(folder: &Path, path: &Path) -> PathBuf {
+pub fn resolve_path(folder: &Path, path: &Path) -> PathBuf {
     if is_url(path) { path.to_owned() } else { folder.join(path) }
 }
 
@@ -29,9 +29,10 @@ pub fn resolve(folder: &Path, path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// A URL that is none, a bucket that does not exist or cannot be listed, a store that does not answer.
-pub fn list(url: &str) -> Result<Vec<String>, RecordingError> {
+pub fn list_objects(url: &str) -> Result<Vec<String>, RecordingError> {
     let Location { bucket, key } = Location::parse(url)?;
-    let pattern = glob::Pattern::new(&key).map_err(|e| bad(url, &format!("its wildcards are wrong: {e}")))?;
+    let pattern =
+        glob::Pattern::new(&key).map_err(|e| url_error(url, &format!("its wildcards are wrong: {e}")))?;
     let options = glob::MatchOptions { require_literal_separator: true, ..glob::MatchOptions::new() };
     // Everything before the first part with a wildcard is a folder that the store can look in by itself.
     let fixed: Vec<&str> = key.split('/').take_while(|part| !part.contains(['*', '?', '['])).collect();
@@ -59,18 +60,18 @@ pub(crate) struct Location {
 impl Location {
     pub fn parse(url: &str) -> Result<Location, RecordingError> {
         let Some(rest) = url.strip_prefix("s3://") else {
-            return Err(bad(url, "only s3:// URLs can be read"));
+            return Err(url_error(url, "only s3:// URLs can be read"));
         };
         match rest.split_once('/') {
             Some((bucket, key)) if !bucket.is_empty() && !key.is_empty() => {
                 Ok(Location { bucket: bucket.to_owned(), key: key.to_owned() })
             }
-            _ => Err(bad(url, "it must be s3://BUCKET/KEY")),
+            _ => Err(url_error(url, "it must be s3://BUCKET/KEY")),
         }
     }
 }
 
-fn bad(url: &str, why: &str) -> RecordingError {
+fn url_error(url: &str, why: &str) -> RecordingError {
     RecordingError::Object { url: url.to_owned(), why: why.to_owned() }
 }
 
@@ -80,7 +81,7 @@ mod tests {
 
     #[test]
     fn urls_stay_and_paths_start_in_their_folder() {
-        let resolved = |path: &str| resolve(Path::new("/lab"), Path::new(path));
+        let resolved = |path: &str| resolve_path(Path::new("/lab"), Path::new(path));
         assert_eq!(resolved("s3://bucket/a b/c.mcap").as_os_str(), "s3://bucket/a b/c.mcap");
         assert_eq!(resolved("day/c.mcap"), Path::new("/lab/day/c.mcap"));
         assert_eq!(resolved("/data/c.mcap"), Path::new("/data/c.mcap"));

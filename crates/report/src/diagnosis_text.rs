@@ -1,10 +1,12 @@
 //! What is missing, for a person in the terminal.
 
-use crate::pen::{Pen, TerminalStyle, number};
-use armcal_core::printable;
+use crate::pen::{Pen, TerminalStyle, number_cell};
+use armcal_core::printable_name;
 use armcal_diagnose::Diagnosis;
 use armcal_result::{Called, Conclusions, Run};
-use armcal_wording::{all_found, answer, explanations, headline, next, pasted, shown_unlisted, sizes};
+use armcal_wording::{
+    all_found, answer, candidate_sizes, explanations, headline, next_steps, shown_unlisted, unlisted_toml,
+};
 use comfy_table::Cell;
 
 /// Rows of the ranking.
@@ -28,19 +30,19 @@ pub fn concluded_text(conclusions: &Conclusions, style: TerminalStyle) -> String
 }
 
 fn full_text(called: &Called, d: &Diagnosis, style: TerminalStyle) -> String {
-    full(&Pen { style }, called, d)
+    diagnosis_sections(&Pen { style }, called, d)
 }
 
 /// What is missing: the answer, what was found, what to do next.
-fn brief(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
+fn answer_section(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
     let list = |label, entries: Vec<String>| pen.list(entries.into_iter().map(|entry| (label, entry)));
-    pen.section(&headline(called, d), list("-", all_found(called, d)) + &list("next:", next(called, d)))
+    pen.section(&headline(called, d), list("-", all_found(called, d)) + &list("next:", next_steps(called, d)))
 }
 
-fn full(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
-    let told = |said: &str| called.in_words(&printable(said));
-    let mut sections = vec![brief(pen, called, d)];
-    sections.push(pen.section("Candidates, best first", ranking(pen, called, d)));
+fn diagnosis_sections(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
+    let told = |said: &str| called.in_words(&printable_name(said));
+    let mut sections = vec![answer_section(pen, called, d)];
+    sections.push(pen.section("Candidates, best first", candidate_table(pen, called, d)));
     if !d.cannot_tell_apart.is_empty() {
         let pairs = d.cannot_tell_apart.iter().map(|[a, b]| ("-", told(&format!("{a} and {b}"))));
         sections.push(pen.section("The same to these data", pen.list(pairs)));
@@ -55,18 +57,21 @@ fn full(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
         });
         sections.push(pen.section("What these data could not have shown", pen.list(rows)));
     }
-    let tables: Vec<String> = shown_unlisted(d).map(pasted).filter(|t| !t.is_empty()).collect();
+    let tables: Vec<String> = shown_unlisted(d).map(unlisted_toml).filter(|t| !t.is_empty()).collect();
     if !tables.is_empty() {
         sections.push(pen.section(PASTE, tables.join("\n")));
     }
     let sentences = explanations(d).into_iter().map(|e| {
-        ("-", format!("{}: {}", called.recordings.number_label(&printable(&e.number)), told(&e.sentence)))
+        (
+            "-",
+            format!("{}: {}", called.recordings.number_label(&printable_name(&e.number)), told(&e.sentence)),
+        )
     });
     sections.push(pen.section("The numbers, one by one", pen.list(sentences)));
     sections.join("\n")
 }
 
-fn ranking(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
+fn candidate_table(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
     let mut table = pen.table(&[
         "explanation",
         "size",
@@ -79,20 +84,20 @@ fn ranking(pen: &Pen, called: &Called, d: &Diagnosis) -> String {
     ]);
     for c in d.candidates.iter().take(RANKED) {
         table.add_row(vec![
-            Cell::new(called.in_words(&printable(&c.spec))),
-            Cell::new(sizes(c)),
-            number(behind(c.standing.map(|s| s.behind_nats), c.standing.map(|s| s.behind_se))),
-            number(c.standing.map_or("-".into(), |s| format!("{:.3}", s.probability))),
-            number(format!("{:.3}", c.p_adjusted)),
-            number(c.holdout_mm.map_or("-".into(), |h| format!("{:.3} -> {:.3}", h.before, h.after))),
-            number(format!("{:.0} %", c.absorbed * 100.0)),
-            Cell::new(called.in_words(&printable(&c.same_to_the_data.join(", ")))),
+            Cell::new(called.in_words(&printable_name(&c.spec))),
+            Cell::new(candidate_sizes(c)),
+            number_cell(score_gap_text(c.standing.map(|s| s.behind_nats), c.standing.map(|s| s.behind_se))),
+            number_cell(c.standing.map_or("-".into(), |s| format!("{:.3}", s.probability))),
+            number_cell(format!("{:.3}", c.p_adjusted)),
+            number_cell(c.holdout_mm.map_or("-".into(), |h| format!("{:.3} -> {:.3}", h.before, h.after))),
+            number_cell(format!("{:.0} %", c.absorbed * 100.0)),
+            Cell::new(called.in_words(&printable_name(&c.same_to_the_data.join(", ")))),
         ]);
     }
     pen.render(&table)
 }
 
 /// How far behind the answer, with its standard error.
-pub(crate) fn behind(nats: Option<f64>, se: Option<f64>) -> String {
+pub(crate) fn score_gap_text(nats: Option<f64>, se: Option<f64>) -> String {
     nats.zip(se).map_or("-".into(), |(nats, se)| format!("{nats:.1} ± {se:.1}"))
 }

@@ -1,6 +1,6 @@
 //! `run.mcap`: the input's messages untouched, the result channels, attachments and metadata.
 
-use crate::channels::{ResultMessage, messages, run_end_ns};
+use crate::channels::{ResultMessage, result_messages, run_end_ns};
 use crate::findings::Findings;
 use armcal_recording::atomic::AtomicFile;
 use armcal_recording::output::McapOutput;
@@ -28,7 +28,7 @@ pub(crate) fn write_mcap(
     path: &Path,
 ) -> Result<AtomicFile, RecordingError> {
     let about = [("armcal/run", about_run(run)), (INPUT_METADATA, about_input(run))];
-    write_results(messages(run, points, findings), inputs, attachments, run_end_ns(run), &about, path)
+    write_results(result_messages(run, points, findings), inputs, attachments, run_end_ns(run), &about, path)
 }
 
 /// Writes results beside the messages of their inputs, with attachments stamped `end_ns` and metadata by name.
@@ -123,17 +123,17 @@ fn about_run(run: &Run) -> BTreeMap<String, String> {
         ("summary_schema".to_owned(), armcal_result::summary::SCHEMA.to_owned()),
     ]);
     if let Ok(pipeline) = run.pipeline_text.parse::<toml::Table>() {
-        seeds("", &pipeline, &mut entries);
+        collect_seeds("", &pipeline, &mut entries);
     }
     entries
 }
 
 /// Every key `seed` of the pipeline, by its dotted path.
-fn seeds(path: &str, table: &toml::Table, entries: &mut BTreeMap<String, String>) {
+fn collect_seeds(path: &str, table: &toml::Table, entries: &mut BTreeMap<String, String>) {
     for (key, value) in table {
         let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
         match value {
-            toml::Value::Table(inner) => seeds(&path, inner, entries),
+            toml::Value::Table(inner) => collect_seeds(&path, inner, entries),
             toml::Value::Integer(seed) if key == "seed" => {
                 entries.insert(path, seed.to_string());
             }

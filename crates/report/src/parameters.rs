@@ -1,7 +1,7 @@
 //! `parameters.toml`: what the calibration says about every parameter and frame, for programs and people.
 
 use crate::ReportError;
-use armcal_recording::sealed;
+use armcal_recording::seal_text;
 use armcal_result::summary::{FrameEntry, ParameterSummary};
 use armcal_result::{Run, VERSION};
 use serde::Serialize;
@@ -47,5 +47,5 @@ pub(crate) fn parameters_toml(run: &Run) -> Result<String, ReportError> {
         frames: FrameEntry::all(run),
     };
     let header = if run.is_pool() { POOLED } else { HEADER };
-    Ok(sealed(&format!("{header}{}", toml::to_string(&file)?)).into_owned())
+    Ok(seal_text(&format!("{header}{}", toml::to_string(&file)?)).into_owned())
 }

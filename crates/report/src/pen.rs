@@ -30,7 +30,7 @@ pub fn table_text(table: &Table) -> String {
 }
 
 /// A cell set flush right.
-pub fn number(value: impl ToString) -> Cell {
+pub fn number_cell(value: impl ToString) -> Cell {
     Cell::new(value).set_alignment(CellAlignment::Right)
 }
 

@@ -1,8 +1,8 @@
 //! The diagnosis of results without [`crate::Conclusions`], from their `summary.json`.
 
-use crate::diagnosis_text::{PASTE, PREDICTED, RANKED, behind};
-use crate::pen::{Pen, TerminalStyle, number};
-use armcal_core::printable;
+use crate::diagnosis_text::{PASTE, PREDICTED, RANKED, score_gap_text};
+use crate::pen::{Pen, TerminalStyle, number_cell};
+use armcal_core::printable_name;
 use armcal_result::{RecordingNames, StoredRun};
 use comfy_table::Cell;
 use serde_json::Value;
@@ -12,7 +12,7 @@ pub fn stored_diagnosis(past: &StoredRun, style: TerminalStyle) -> String {
     let pen = Pen { style };
     let d = &past.summary["diagnosis"];
     let names = RecordingNames::new(past.recordings.iter().map(|r| r.name.clone()));
-    let text = |v: &Value| v.as_str().map(printable).unwrap_or_default();
+    let text = |v: &Value| v.as_str().map(printable_name).unwrap_or_default();
     let list = |v: &Value| v.as_array().into_iter().flatten().map(text).collect::<Vec<_>>();
     let told = |v: &Value| names.in_words(&text(v));
     let answer = told(&past.summary["answer_sentence"]);
@@ -31,10 +31,10 @@ pub fn stored_diagnosis(past: &StoredRun, style: TerminalStyle) -> String {
         let h = &c["holdout_mm"];
         table.add_row(vec![
             Cell::new(told(&c["spec"])),
-            number(behind(c["behind_nats"].as_f64(), c["behind_se"].as_f64())),
-            number(three(&c["probability"])),
-            number(three(&c["p_adjusted"])),
-            number(format!("{} -> {}", three(&h["before"]), three(&h["after"]))),
+            number_cell(score_gap_text(c["behind_nats"].as_f64(), c["behind_se"].as_f64())),
+            number_cell(three(&c["probability"])),
+            number_cell(three(&c["p_adjusted"])),
+            number_cell(format!("{} -> {}", three(&h["before"]), three(&h["after"]))),
         ]);
     }
     let sentences = d["explanations"].as_array().into_iter().flatten();
@@ -46,7 +46,7 @@ pub fn stored_diagnosis(past: &StoredRun, style: TerminalStyle) -> String {
         pen.section("Candidates, best first", pen.render(&table)),
     ];
     let unlisted = d["unlisted"].as_array().into_iter().flatten();
-    let safe = |table: &str| table.lines().map(|l| printable(l) + "\n").collect::<String>();
+    let safe = |table: &str| table.lines().map(|l| printable_name(l) + "\n").collect::<String>();
     let tables: Vec<String> =
         unlisted.filter_map(|u| u["table"].as_str()).filter(|table| !table.is_empty()).map(safe).collect();
     if !tables.is_empty() {

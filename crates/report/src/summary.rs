@@ -8,18 +8,18 @@ use armcal_result::summary::{
     RecordingSummary, RefitSummary, SCHEMA, Summary, UnlistedSummary,
 };
 use armcal_result::{ResultError, Run, TwoArms, VERSION};
-use armcal_wording::{answer, conclusion, explanations, pasted};
+use armcal_wording::{answer, conclusion, explanations, unlisted_toml};
 
 /// The summary of a run: indented JSON with a final newline.
 ///
 /// # Errors
 /// A recording that cannot be read once more for its hash.
 pub fn summary_json(run: &Run) -> Result<String, ReportError> {
-    let text = serde_json::to_string_pretty(&summary(run)?);
+    let text = serde_json::to_string_pretty(&run_summary(run)?);
     Ok(text.map_err(ReportError::Page)? + "\n")
 }
 
-fn summary(run: &Run) -> Result<Summary<'_>, ResultError> {
+fn run_summary(run: &Run) -> Result<Summary<'_>, ResultError> {
     let answer = answer(run);
     let recordings = run.recordings.iter().map(|r| RecordingSummary::of(run, r));
     Ok(Summary {
@@ -37,21 +37,21 @@ fn summary(run: &Run) -> Result<Summary<'_>, ResultError> {
         setup: &run.setup,
         answer: answer.word,
         answer_sentence: answer.sentence,
-        diagnosis: run.diagnosis.as_ref().map(diagnosis),
+        diagnosis: run.diagnosis.as_ref().map(diagnosis_summary),
         conclusion: conclusion(&run.calibration),
         warnings: run.overall_warnings(),
     })
 }
 
-fn diagnosis(d: &Diagnosis) -> DiagnosisSummary<'_> {
+fn diagnosis_summary(d: &Diagnosis) -> DiagnosisSummary<'_> {
     DiagnosisSummary {
         verdict: d.verdict,
         names: &d.names,
         probability: d.probability,
         p_adjusted: d.p_adjusted,
-        candidates: d.candidates.iter().map(candidate).collect(),
-        unknown: d.unknown.as_ref().map(unlisted),
-        unlisted: d.unlisted.iter().map(unlisted).collect(),
+        candidates: d.candidates.iter().map(candidate_summary).collect(),
+        unknown: d.unknown.as_ref().map(unlisted_summary),
+        unlisted: d.unlisted.iter().map(unlisted_summary).collect(),
         cannot_tell_apart: &d.cannot_tell_apart,
         not_testable: &d.not_testable,
         record_next: &d.record_next,
@@ -68,7 +68,7 @@ fn diagnosis(d: &Diagnosis) -> DiagnosisSummary<'_> {
     }
 }
 
-fn candidate(c: &CandidateReport) -> CandidateSummary<'_> {
+fn candidate_summary(c: &CandidateReport) -> CandidateSummary<'_> {
     // One-step estimate of an amplitude.
     let amplitude = |p: &ParameterReport| AmplitudeSummary { value: p.value, ci95: p.ci95, unit: p.unit };
     CandidateSummary {
@@ -88,14 +88,14 @@ fn candidate(c: &CandidateReport) -> CandidateSummary<'_> {
     }
 }
 
-fn unlisted(u: &UnknownReport) -> UnlistedSummary<'_> {
+fn unlisted_summary(u: &UnknownReport) -> UnlistedSummary<'_> {
     let expression = u.expression.as_ref();
     UnlistedSummary {
         channel: &u.channel,
         driver: &u.driver,
         expression: expression.map_or("", |e| &e.formula),
         acts_on: expression.map(|e| e.acts_on.as_str()),
-        table: pasted(u),
+        table: unlisted_toml(u),
         probability: u.probability,
         holdout_mm: BeforeAfter { before: u.places.before, after: u.places.after },
         unit: u.unit,

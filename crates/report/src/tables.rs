@@ -22,11 +22,11 @@ pub(crate) fn parquet_files(
     run: &Run,
     points: &[Point],
 ) -> Result<Vec<(&'static str, Vec<u8>)>, ReportError> {
-    let tables = [dwells(run), observations(run, points), parameters(run)];
+    let tables = [dwell_columns(run), observation_columns(run, points), parameter_columns(run)];
     FILES.into_iter().zip(tables).map(|(name, columns)| Ok((name, columns.encode(name)?))).collect()
 }
 
-fn dwells(run: &Run) -> Columns {
+fn dwell_columns(run: &Run) -> Columns {
     let rows: Vec<(&RecordingRun, &Dwell)> =
         run.recordings.iter().flat_map(|r| r.dwells.iter().map(move |d| (r, d))).collect();
     let mut c = Columns::default();
@@ -65,7 +65,7 @@ fn dwells(run: &Run) -> Columns {
     c
 }
 
-fn observations(run: &Run, points: &[Point]) -> Columns {
+fn observation_columns(run: &Run, points: &[Point]) -> Columns {
     let mut c = Columns::default();
     let observed = |f: fn(&Observation) -> Option<f64>| points.iter().map(move |p| f(p.observation));
     c.text("recording", points.iter().map(|p| Some(run.recording_name(p.observation.dwell))));
@@ -108,7 +108,7 @@ fn observations(run: &Run, points: &[Point]) -> Columns {
     c
 }
 
-fn parameters(run: &Run) -> Columns {
+fn parameter_columns(run: &Run) -> Columns {
     let rows = &run.calibration.fit.estimates;
     let number = |f: fn(&Estimate) -> f64| rows.iter().map(move |e| Some(f(e)));
     let mut c = Columns::default();
@@ -163,7 +163,7 @@ impl Columns {
 
     fn places(&mut self, places: &[Option<&Assignment>]) {
         self.text("place", places.iter().map(|a| a.map(|a| a.place.word())));
-        self.text("cavity", places.iter().map(|a| a.and_then(cavity)));
+        self.text("cavity", places.iter().map(|a| a.and_then(cavity_name)));
         self.confidence(places);
         let height = |a: &Assignment| match a.place {
             Place::Hovering { height_m, .. } => Some(height_m * 1e3),
@@ -188,11 +188,11 @@ impl Columns {
 
     pub fn encode(self, table: &'static str) -> Result<Vec<u8>, ReportError> {
         let failed = |e: PolarsError| ReportError::Parquet { table, source: Box::new(e) };
-        parquet(self.columns, mark(table)).map_err(failed)
+        encode_parquet(self.columns, schema_name(table)).map_err(failed)
     }
 }
 
-fn cavity(a: &Assignment) -> Option<&str> {
+fn cavity_name(a: &Assignment) -> Option<&str> {
     match &a.place {
         Place::Seated { cavity, .. } => Some(cavity),
         Place::Hovering { above, .. } => Some(above),
@@ -201,7 +201,7 @@ fn cavity(a: &Assignment) -> Option<&str> {
 }
 
 /// What the footer says the table is; `run.mcap` and `pool` have words of their own for parameters and campaigns.
-fn mark(table: &str) -> String {
+fn schema_name(table: &str) -> String {
     let kind = match table {
         "parameters.parquet" => "parameters-table",
         "campaign.parquet" => "campaign-table",
@@ -210,7 +210,7 @@ fn mark(table: &str) -> String {
     format!("armcal.{kind}/1")
 }
 
-fn parquet(columns: Vec<Column>, mark: String) -> PolarsResult<Vec<u8>> {
+fn encode_parquet(columns: Vec<Column>, mark: String) -> PolarsResult<Vec<u8>> {
     let mut bytes = Vec::new();
     let metadata = KeyValueMetadata::from_static(vec![("schema".into(), mark)]);
     ParquetWriter::new(&mut bytes)

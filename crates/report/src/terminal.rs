@@ -1,12 +1,14 @@
 //! The summary a person reads in the terminal: the story in one screen, or everything.
 
-use crate::pen::{Pen, TerminalStyle, number};
+use crate::pen::{Pen, TerminalStyle, number_cell};
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
-use armcal_core::units::millimetres;
-use armcal_core::{ErrorStats, Severity, printable};
+use armcal_core::units::format_mm;
+use armcal_core::{ErrorStats, Severity, printable_name};
 use armcal_result::by_marker::{MarkerErrors, by_marker};
 use armcal_result::{Run, Status, VERSION};
-use armcal_wording::{SHOWN, Story, ToldWarning, about, errors_are, estimate_shown, remark};
+use armcal_wording::{
+    SHOWN, Story, ToldWarning, errors_are, estimate_remark, estimate_shown, joined_tips_text,
+};
 use comfy_table::Cell;
 
 /// How much of a run is told.
@@ -39,32 +41,29 @@ impl Shown {
 }
 
 /// The summary of a run, ending in a newline. It ends with the verdict, the status and the next step.
-pub fn terminal(run: &Run, style: TerminalStyle, detail: Detail) -> String {
-    let text = summary(run, style, detail, Shown::USUAL);
+pub fn run_text(run: &Run, style: TerminalStyle, detail: Detail) -> String {
+    let text = summary_sections(run, style, detail, Shown::USUAL);
     let few = Shown { recordings: FEW, ..Shown::USUAL };
     let shorter = [few, Shown { next: 1, ..few }, Shown { next: 1, found: 1, ..few }];
     let fits = |text: &String| detail == Detail::Everything || text.lines().count() <= SCREEN;
-    shorter.into_iter().fold(
-        text,
-        |text, shown| {
-            if fits(&text) { text } else { summary(run, style, detail, shown) }
-        },
-    )
+    shorter.into_iter().fold(text, |text, shown| {
+        if fits(&text) { text } else { summary_sections(run, style, detail, shown) }
+    })
 }
 
-fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> String {
+fn summary_sections(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> String {
     let pen = Pen { style };
     let pooled = run.is_pool().then(|| format!("{} recordings of one arm", run.recordings.len()));
-    let about = about(run).or(pooled).map_or_else(String::new, |about| format!("   {about}"));
+    let about = joined_tips_text(run).or(pooled).map_or_else(String::new, |about| format!("   {about}"));
     let mut sections =
-        vec![format!("armcal {VERSION}   pipeline {}{about}\n", printable(&run.pipeline_name))];
+        vec![format!("armcal {VERSION}   pipeline {}{about}\n", printable_name(&run.pipeline_name))];
     let story = Story::of(run);
     let leads = matches!(story.lamp, "setup" | "unexplained");
     sections.extend(leads.then(|| pen.verdict(&story.missing, false)));
-    sections.push(pen.section("Recordings", recordings(&pen, run, shown.recordings)));
+    sections.push(pen.section("Recordings", recording_table(&pen, run, shown.recordings)));
     let errors = match detail {
         Detail::Story => errors_that_count(&pen, &run.calibration),
-        Detail::Everything => errors(&pen, &run.calibration),
+        Detail::Everything => error_table(&pen, &run.calibration),
     };
     sections.push(pen.section(&format!("{} [mm]", errors_are(run)), errors));
     let markers = by_marker(run);
@@ -75,33 +74,33 @@ fn summary(run: &Run, style: TerminalStyle, detail: Detail, shown: Shown) -> Str
     );
     match detail {
         Detail::Everything => {
-            sections.push(pen.section("Parameters", parameters(&pen, &run.calibration)));
-            sections.extend(undetermined(&pen, &run.calibration));
-            sections.extend(listed(&pen, story.warnings.iter().collect(), 0));
+            sections.push(pen.section("Parameters", parameter_table(&pen, &run.calibration)));
+            sections.extend(undetermined_section(&pen, &run.calibration));
+            sections.extend(warning_section(&pen, story.warnings.iter().collect(), 0));
         }
-        Detail::Story => sections.extend(briefly(&pen, summarised(&run.calibration), &story)),
+        Detail::Story => sections.extend(brief_sections(&pen, parameter_sentence(&run.calibration), &story)),
     }
-    sections.extend(ending(&pen, &story, detail, shown));
+    sections.extend(conclusion_sections(&pen, &story, detail, shown));
     sections.join("\n")
 }
 
 /// What is said of the `parameters`, notices by their number, the gravest warnings by their words.
-pub(crate) fn briefly(pen: &Pen, parameters: Option<String>, story: &Story) -> Vec<String> {
+pub(crate) fn brief_sections(pen: &Pen, parameters: Option<String>, story: &Story) -> Vec<String> {
     let (notices, mut grave): (Vec<_>, Vec<_>) =
         story.warnings.iter().partition(|w| w.severity == Severity::Notice);
     // What the answer says already is not said once more.
     grave.retain(|w| !story.missing.contains(&w.message));
-    let left_out = [parameters, counted(notices.len())];
+    let left_out = [parameters, notice_count_text(notices.len())];
     let left_out: Vec<String> = left_out.into_iter().flatten().collect();
     let brief = (!left_out.is_empty()).then(|| format!("{} (`-v` lists them)", left_out.join("; ")));
     let counted = brief.map(|brief| pen.list(std::iter::once(("-", brief))));
     let more = grave.len().saturating_sub(SHOWN);
     grave.truncate(SHOWN);
-    counted.into_iter().chain(listed(pen, grave, more)).collect()
+    counted.into_iter().chain(warning_section(pen, grave, more)).collect()
 }
 
 /// What it came to, what is missing, the status and the next step.
-pub(crate) fn ending(pen: &Pen, story: &Story, detail: Detail, shown: Shown) -> [String; 2] {
+pub(crate) fn conclusion_sections(pen: &Pen, story: &Story, detail: Detail, shown: Shown) -> [String; 2] {
     let verdict = |text: &str| pen.verdict(text, story.status == Status::Ok);
     let list = |label, entries: &[String], most: usize| match detail {
         Detail::Everything => pen.list(entries.iter().map(|e| (label, e.clone()))),
@@ -123,9 +122,10 @@ fn first_ones(entries: &[String], most: usize) -> Vec<String> {
 }
 
 /// The parameters in one sentence; none where none is free.
-pub(crate) fn summarised(calibration: &Calibration) -> Option<String> {
+pub(crate) fn parameter_sentence(calibration: &Calibration) -> Option<String> {
     let free = || calibration.fit.estimates.iter().filter(|e| e.parameter.free);
-    let open: Vec<String> = free().filter(|e| !e.determined).map(|e| printable(&e.parameter.name)).collect();
+    let open: Vec<String> =
+        free().filter(|e| !e.determined).map(|e| printable_name(&e.parameter.name)).collect();
     let named = open.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
     let more = if open.len() > NAMED { ", .." } else { "" };
     let undetermined = match open.len() {
@@ -135,11 +135,11 @@ pub(crate) fn summarised(calibration: &Calibration) -> Option<String> {
     (free().count() > 0).then(|| format!("{} parameters fitted, {undetermined}", free().count()))
 }
 
-fn counted(n: usize) -> Option<String> {
+fn notice_count_text(n: usize) -> Option<String> {
     (n > 0).then(|| if n == 1 { "1 notice".to_owned() } else { format!("{n} notices") })
 }
 
-fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
+fn recording_table(pen: &Pen, run: &Run, most: usize) -> String {
     let pool = run.is_pool();
     let mut table = pen.table(match pool {
         true => &["recording", "dwells", "rejected", "nominal [mm]", "calibrated", "as a new day"],
@@ -152,8 +152,8 @@ fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
         let (dwells, rejected) = (recording.found().to_string(), recording.rejected().to_string());
         let numbers = match errors.get(at) {
             Some(e) => {
-                let unseen = e.unseen.map_or("-".into(), |unseen| millimetres(unseen.mean_m));
-                [dwells, rejected, millimetres(e.nominal.mean_m), millimetres(e.calibrated.mean_m), unseen]
+                let unseen = e.unseen.map_or("-".into(), |unseen| format_mm(unseen.mean_m));
+                [dwells, rejected, format_mm(e.nominal.mean_m), format_mm(e.calibrated.mean_m), unseen]
             }
             None => {
                 let associated = run.associated(recording).to_string();
@@ -161,8 +161,8 @@ fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
                 [dwells, associated, rejected, offset_ms, drift_ppm]
             }
         };
-        let name = [Cell::new(printable(&recording.name))];
-        table.add_row(name.into_iter().chain(numbers.map(number)).collect::<Vec<Cell>>());
+        let name = [Cell::new(printable_name(&recording.name))];
+        table.add_row(name.into_iter().chain(numbers.map(number_cell)).collect::<Vec<Cell>>());
     }
     let more = run.recordings.len().saturating_sub(most);
     let rest = format!("and {more} more (`-v` lists them)");
@@ -173,15 +173,15 @@ fn recordings(pen: &Pen, run: &Run, most: usize) -> String {
 fn of_markers(pen: &Pen, markers: &[MarkerErrors<'_>], what: &str) -> String {
     let mut table = pen.table(&[what, "n", "nominal", "calibrated", "declared noise"]);
     for of in markers {
-        let mut row = vec![Cell::new(printable(&of.marker)), number(of.n)];
-        row.extend(of.shown().map(number));
+        let mut row = vec![Cell::new(printable_name(&of.marker)), number_cell(of.n)];
+        row.extend(of.shown().map(number_cell));
         table.add_row(row);
     }
     pen.render(&table)
 }
 
 /// Nominal and calibrated errors on both sides of the hold-out.
-pub(crate) fn errors(pen: &Pen, calibration: &Calibration) -> String {
+pub(crate) fn error_table(pen: &Pen, calibration: &Calibration) -> String {
     errors_on(pen, calibration, &[("fitted", &calibration.train), ("held out", &calibration.holdout)])
 }
 
@@ -189,7 +189,7 @@ pub(crate) fn errors(pen: &Pen, calibration: &Calibration) -> String {
 fn errors_that_count(pen: &Pen, calibration: &Calibration) -> String {
     match calibration.held_out() {
         true => errors_on(pen, calibration, &[("held out", &calibration.holdout)]),
-        false => errors(pen, calibration),
+        false => error_table(pen, calibration),
     }
 }
 
@@ -203,19 +203,19 @@ fn errors_on(pen: &Pen, calibration: &Calibration, sides: &[(&str, &SideErrors)]
         table.add_row(error_row("", String::new(), "calibrated", &side.fitted));
     }
     let mut floor = vec![Cell::new("declared noise"), Cell::new(""), Cell::new("")];
-    floor.push(number(millimetres(calibration.noise_floor_m)));
+    floor.push(number_cell(format_mm(calibration.noise_floor_m)));
     table.add_row(floor);
     pen.render(&table)
 }
 
 fn error_row(label: &str, n: String, parameters: &str, stats: &ErrorStats) -> Vec<Cell> {
-    let mut row = vec![Cell::new(label), number(n), Cell::new(parameters)];
-    row.extend([stats.mean_m, stats.rms_m, stats.p95_m, stats.max_m].map(|m| number(millimetres(m))));
+    let mut row = vec![Cell::new(label), number_cell(n), Cell::new(parameters)];
+    row.extend([stats.mean_m, stats.rms_m, stats.p95_m, stats.max_m].map(|m| number_cell(format_mm(m))));
     row
 }
 
 /// Free parameters only; the fixed ones are counted below the table and listed in `parameters.toml`.
-pub(crate) fn parameters(pen: &Pen, calibration: &Calibration) -> String {
+pub(crate) fn parameter_table(pen: &Pen, calibration: &Calibration) -> String {
     parameters_of(pen, &calibration.fit.estimates.iter().collect::<Vec<_>>())
 }
 
@@ -226,9 +226,9 @@ pub(crate) fn parameters_of(pen: &Pen, estimates: &[&Estimate]) -> String {
         estimates.iter().copied().partition(|e| e.parameter.free);
     for e in free {
         let mut row =
-            vec![Cell::new(printable(&e.parameter.name)), Cell::new(e.parameter.unit.display_symbol())];
-        row.extend(estimate_shown(e).map(number));
-        row.push(pen.mark(Cell::new(remark(e))));
+            vec![Cell::new(printable_name(&e.parameter.name)), Cell::new(e.parameter.unit.display_symbol())];
+        row.extend(estimate_shown(e).map(number_cell));
+        row.push(pen.mark(Cell::new(estimate_remark(e))));
         table.add_row(row);
     }
     let mut text = pen.render(&table);
@@ -241,15 +241,15 @@ pub(crate) fn parameters_of(pen: &Pen, estimates: &[&Estimate]) -> String {
 }
 
 /// What the data leave open, if anything.
-pub(crate) fn undetermined(pen: &Pen, calibration: &Calibration) -> Option<String> {
+pub(crate) fn undetermined_section(pen: &Pen, calibration: &Calibration) -> Option<String> {
     let directions = &calibration.fit.undetermined;
-    let texts = directions.iter().map(|d| ("-", printable(&d.text)));
+    let texts = directions.iter().map(|d| ("-", printable_name(&d.text)));
     (!directions.is_empty())
         .then(|| pen.section("What these data cannot determine (kept near nominal)", pen.list(texts)))
 }
 
 /// Warnings, and that there are more of them.
-pub(crate) fn listed(pen: &Pen, warnings: Vec<&ToldWarning>, more: usize) -> Option<String> {
+pub(crate) fn warning_section(pen: &Pen, warnings: Vec<&ToldWarning>, more: usize) -> Option<String> {
     let entries = warnings.iter().map(|w| (w.severity.word(), w.text()));
     let rest = (more > 0).then(|| ("", format!("and {more} more (`-v` lists them)")));
     (!warnings.is_empty()).then(|| pen.section("Warnings", pen.list(entries.chain(rest))))

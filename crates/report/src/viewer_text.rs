@@ -7,11 +7,11 @@ const ON: &str = ".. ";
 
 /// Entries that are shown whole, in words: Lichtblick takes `->` for a change between two messages and colours it as one.
 pub(crate) fn for_viewer(entries: impl IntoIterator<Item = String>) -> Vec<String> {
-    entries.into_iter().flat_map(|entry| whole(&entry.replace(" -> ", " to "))).collect()
+    entries.into_iter().flat_map(|entry| split_entry(&entry.replace(" -> ", " to "))).collect()
 }
 
 /// In pieces that are short enough, each broken between two words.
-fn whole(entry: &str) -> Vec<String> {
+fn split_entry(entry: &str) -> Vec<String> {
     let mut pieces = vec![String::new()];
     for word in entry.split(' ') {
         let piece = pieces.last_mut().expect("there is one from the start");

@@ -1,7 +1,7 @@
 //! All files of a run, in one folder.
 
 use crate::findings::Findings;
-use crate::layouts::layouts;
+use crate::layouts::run_layouts;
 use crate::mcap_file::{Attachment, write_mcap};
 use crate::page::report_html;
 use crate::parameters::parameters_toml;
@@ -58,7 +58,7 @@ pub fn write_all(
     let summary = summary_json(run)?;
     let tables = parquet_files(run, &points)?;
     let findings = Findings::of(run, &points);
-    let layouts = layouts(run, &points, &findings);
+    let layouts = run_layouts(run, &points, &findings);
     let page = report_html(run, &Basis::of(run))?;
 
     make_folder(out_dir).map_err(|source| ReportError::Folder(Box::new(source)))?;
@@ -74,10 +74,10 @@ pub fn write_all(
     ];
     let models_as_texts = models.iter().map(|model| (model.name.as_str(), &model.text));
     for (name, text) in texts.into_iter().chain(models_as_texts) {
-        staged.push(stage(&out_dir.join(name), text.as_bytes())?);
+        staged.push(stage_file(&out_dir.join(name), text.as_bytes())?);
     }
     for (name, bytes) in &tables {
-        staged.push(stage(&out_dir.join(name), bytes)?);
+        staged.push(stage_file(&out_dir.join(name), bytes)?);
     }
 
     let mut attachments = vec![
@@ -100,7 +100,7 @@ pub fn write_all(
     let mcap_path = out_dir.join(RUN);
     let mcap = write_mcap(run, &points, &findings, to_copy, &attachments, &mcap_path);
     // The last to get its name: by what the old one holds, files of earlier versions are known.
-    staged.push(mcap.map_err(at(&mcap_path))?);
+    staged.push(mcap.map_err(write_error(&mcap_path))?);
     commit_all(staged)
 }
 
@@ -110,7 +110,7 @@ pub fn run_files<'a>(
     out_dir: &Path,
     arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
 ) -> Vec<PathBuf> {
-    files(out_dir, arms, OBSERVATIONS_FILE)
+    output_paths(out_dir, arms, OBSERVATIONS_FILE)
 }
 
 /// The same of a run of earlier results.
@@ -118,10 +118,10 @@ pub fn pool_files<'a>(
     out_dir: &Path,
     arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
 ) -> Vec<PathBuf> {
-    files(out_dir, arms, pool_json::FILE)
+    output_paths(out_dir, arms, pool_json::FILE)
 }
 
-fn files<'a>(
+fn output_paths<'a>(
     out_dir: &Path,
     arms: impl IntoIterator<Item = (Option<&'a str>, bool)>,
     observations: &str,
@@ -147,13 +147,13 @@ pub fn write_brief(run: &Run, out_dir: &Path) -> Result<(), ReportError> {
     ];
     for (name, text) in texts {
         let path = out_dir.join(name);
-        stage(&path, text.as_bytes())?.commit().map_err(at(&path))?;
+        stage_file(&path, text.as_bytes())?.commit().map_err(write_error(&path))?;
     }
     Ok(())
 }
 
 /// A complete file that has no name yet.
-pub(crate) fn stage(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
+pub(crate) fn stage_file(path: &Path, bytes: &[u8]) -> Result<AtomicFile, ReportError> {
     stage_pieces(path, |out| out.write_all(bytes))
 }
 
@@ -163,8 +163,8 @@ pub(crate) fn stage_pieces(
     write: impl FnOnce(&mut BufWriter<AtomicFile>) -> io::Result<()>,
 ) -> Result<AtomicFile, ReportError> {
     let refused =
-        |e: io::Error| at(path)(RecordingError::Write { path: path.to_owned(), why: e.to_string() });
-    let mut file = BufWriter::new(AtomicFile::create(path).map_err(at(path))?);
+        |e: io::Error| write_error(path)(RecordingError::Write { path: path.to_owned(), why: e.to_string() });
+    let mut file = BufWriter::new(AtomicFile::create(path).map_err(write_error(path))?);
     write(&mut file).map_err(refused)?;
     file.into_inner().map_err(|e| refused(e.into_error()))
 }
@@ -174,18 +174,18 @@ pub(crate) fn commit_all(staged: Vec<AtomicFile>) -> Result<Vec<PathBuf>, Report
     may_commit(&staged)?;
     let named = |file: AtomicFile| {
         let path = file.target().to_owned();
-        file.commit().map_err(at(&path)).map(|()| path)
+        file.commit().map_err(write_error(&path)).map(|()| path)
     };
     staged.into_iter().map(named).collect()
 }
 
 /// Whether each of these may take its place.
 fn may_commit(staged: &[AtomicFile]) -> Result<(), ReportError> {
-    staged.iter().try_for_each(|file| file.may_commit().map_err(at(file.target())))
+    staged.iter().try_for_each(|file| file.may_commit().map_err(write_error(file.target())))
 }
 
 /// What writing this file ran into.
-pub(crate) fn at(path: &Path) -> impl FnOnce(RecordingError) -> ReportError {
+pub(crate) fn write_error(path: &Path) -> impl FnOnce(RecordingError) -> ReportError {
     let path = path.to_owned();
     move |source| ReportError::Write { path, source: Box::new(source) }
 }

@@ -2,7 +2,7 @@
 
 use crate::run::Run;
 use armcal_core::Observation;
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ pub struct MarkerErrors<'a> {
 impl MarkerErrors<'_> {
     /// Mean errors as tables show them [mm]: nominal, fitted, floor.
     pub fn shown(&self) -> [String; 3] {
-        [self.nominal_mm, self.fitted_mm, self.floor_mm].map(|mm| millimetres(mm * 1e-3))
+        [self.nominal_mm, self.fitted_mm, self.floor_mm].map(|mm| format_mm(mm * 1e-3))
     }
 }
 
@@ -38,7 +38,7 @@ pub fn is_told(run: &Run) -> bool {
 }
 
 /// The name of what an observation is of.
-pub fn name(run: &Run, o: &Observation) -> String {
+pub fn marker_name(run: &Run, o: &Observation) -> String {
     run.model.measured_name(o).unwrap_or_else(|| run.model.feature_name(o.feature).to_owned())
 }
 
@@ -57,7 +57,7 @@ pub fn by_marker(run: &Run) -> Vec<MarkerErrors<'_>> {
         let o = own.first()?.1;
         let mean_mm = |sum_m: f64| sum_m / own.len() as f64 * 1e3;
         Some(MarkerErrors {
-            marker: name(run, o),
+            marker: marker_name(run, o),
             link: link(o.feature),
             n: own.len(),
             nominal_mm: mean_mm(own.iter().map(|(r, _)| r.nominal_m.norm()).sum()),

@@ -1,7 +1,7 @@
 //! What a campaign found, as a value. Everything is in the order of the manifest; nothing depends on when or where a recording was
 //! worked on.
 
-use armcal_campaign::{Change, Row, Series, Status, changes, series};
+use armcal_campaign::{Change, Row, Series, Status, find_changes, quantity_series};
 
 /// Many recordings of one rig, each calibrated by itself.
 #[derive(Debug, Clone)]
@@ -62,15 +62,15 @@ impl Campaign {
         repeats: Vec<Repeat>,
     ) -> Campaign {
         let (rows, folders): (Vec<Row>, Vec<String>) = results.into_iter().unzip();
-        let series = series(&rows, |row| counts(&repeats, row));
-        let changes = changes(&series);
+        let series = quantity_series(&rows, |row| is_counted(&repeats, row));
+        let changes = find_changes(&series);
         Campaign { pipeline: pipeline.to_owned(), rows, folders, failed, repeats, series, changes }
     }
 
     /// Rows that are evidence of their own.
     pub fn counted(&self) -> impl Iterator<Item = &Row> {
         let rows = self.rows.iter().enumerate();
-        rows.filter(|(row, _)| counts(&self.repeats, *row)).map(|(_, row)| row)
+        rows.filter(|(row, _)| is_counted(&self.repeats, *row)).map(|(_, row)| row)
     }
 
     /// The gravest thing about any recording; one that failed counts as data lost.
@@ -80,6 +80,6 @@ impl Campaign {
     }
 }
 
-fn counts(repeats: &[Repeat], row: usize) -> bool {
+fn is_counted(repeats: &[Repeat], row: usize) -> bool {
     !repeats.iter().any(|repeat| repeat.row == row && repeat.counts_once())
 }

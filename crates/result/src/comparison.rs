@@ -1,6 +1,6 @@
 //! Two results on the same dwells.
 
-use crate::pairing::{Paired, Unpaired, paired};
+use crate::pairing::{Paired, Unpaired, pair_dwells};
 use crate::proto;
 use crate::stored::{StoredResidual, StoredRun};
 use armcal_calibrate::{Pair, PairedDifference, independent_groups};
@@ -88,19 +88,19 @@ pub struct Moved {
 impl Comparison {
     /// Compares dwell by dwell: the same time of the same recording, whatever it is called in each result.
     pub fn of(before: &StoredRun, after: &StoredRun) -> Comparison {
-        let Paired { pairs: matched, unpaired } = paired(before, after);
+        let Paired { pairs: matched, unpaired } = pair_dwells(before, after);
         let held: Vec<_> = matched.iter().copied().filter(|(b, a)| b.held_out && a.held_out).collect();
         let judged = if held.is_empty() { &matched } else { &held };
         let (added, removed) = (only_in(after, before), only_in(before, after));
         Comparison {
             effects: [before.effects.clone(), after.effects.clone()],
-            held_out: difference(&held),
-            all: difference(&matched),
+            held_out: paired_difference(&held),
+            all: paired_difference(&matched),
             recordings: by_recording(judged),
             unmatched: unpaired.iter().map(|u| u.dwells).sum(),
             unpaired,
             dwells: most_changed(judged),
-            moved: moved(before, after),
+            moved: parameter_changes(before, after),
             added,
             removed,
         }
@@ -114,7 +114,7 @@ impl Comparison {
     }
 }
 
-fn difference(rows: &[(&StoredResidual, &StoredResidual)]) -> Option<Difference> {
+fn paired_difference(rows: &[(&StoredResidual, &StoredResidual)]) -> Option<Difference> {
     let dwells: Vec<_> = rows.iter().map(|(_, a)| (a.dwell.to_string(), Some(a.cavity.as_str()))).collect();
     let pairs: Vec<Pair> = rows
         .iter()
@@ -143,7 +143,7 @@ fn by_recording(rows: &[(&StoredResidual, &StoredResidual)]) -> Vec<(String, Dif
         }
     }
     let of = |name: &str| rows.iter().copied().filter(|(_, a)| a.recording == name).collect::<Vec<_>>();
-    names.iter().filter_map(|name| difference(&of(name)).map(|d| ((*name).to_owned(), d))).collect()
+    names.iter().filter_map(|name| paired_difference(&of(name)).map(|d| ((*name).to_owned(), d))).collect()
 }
 
 /// The most improved dwells, then the most worsened.
@@ -165,7 +165,7 @@ fn most_changed(rows: &[(&StoredResidual, &StoredResidual)]) -> Vec<DwellChange>
     all
 }
 
-fn moved(before: &StoredRun, after: &StoredRun) -> Vec<Moved> {
+fn parameter_changes(before: &StoredRun, after: &StoredRun) -> Vec<Moved> {
     let mut moved: Vec<Moved> = after
         .parameters
         .iter()

@@ -45,13 +45,13 @@ pub use error::ResultError;
 pub use files::{ObservedFile, sha256};
 pub use left_out::{INPUT_METADATA, OWN, PREFIX};
 pub use model_file::{ModelFile, marked_xml, model_file_name, model_files};
-pub use pairing::{Paired, Side, Unpaired, paired};
+pub use pairing::{Paired, Side, Unpaired, pair_dwells};
 pub use points::{Point, extent, points};
 pub use recorded_time::RecordedTime;
 pub use recording_names::RecordingNames;
 pub use run::{
-    EarlierResult, RecordingErrors, RecordingRun, Refit, Run, Undiagnosed, VERSION, effects, role_word,
-    status_word, without_repeats,
+    EarlierResult, RecordingErrors, RecordingRun, Refit, Run, Undiagnosed, VERSION, effect_part_names,
+    role_word, status_word, without_repeats,
 };
 pub use same_dwells::also_in;
 pub use stored::*;

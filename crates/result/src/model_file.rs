@@ -4,7 +4,7 @@
 use crate::{ResultError, Run};
 use armcal_core::Warning;
 use armcal_model::{Arm, Model};
-use armcal_recording::sealed;
+use armcal_recording::seal_text;
 use std::path::Path;
 
 /// By this the file is known for armcal's own.
@@ -32,10 +32,10 @@ pub fn model_files(run: &Run) -> Result<Vec<ModelFile>, ResultError> {
     let arms = model.chain().arms();
     if arms.is_empty() {
         let text = run.model_texts.first().map_or("", String::as_str);
-        return Ok(vec![calibrated((model, 0), text, &values)?]);
+        return Ok(vec![arm_model_file((model, 0), text, &values)?]);
     }
     let of_arm = |(at, (arm, text)): (usize, (&Arm, &String))| {
-        let file = calibrated((model, at), text, &values)?;
+        let file = arm_model_file((model, at), text, &values)?;
         Ok(ModelFile { name: model_file_name(Some(&arm.name), file.name == URDF), ..file })
     };
     arms.iter().zip(&run.model_texts).enumerate().map(of_arm).collect()
@@ -48,7 +48,7 @@ pub fn model_file_name(arm: Option<&str>, urdf: bool) -> String {
 }
 
 /// An arm of a model with the parameters `p`, in the form of the text that its nominal one was read from.
-fn calibrated(
+fn arm_model_file(
     (model, arm): (&Model, usize),
     nominal_text: &str,
     p: &[f64],
@@ -56,10 +56,10 @@ fn calibrated(
     let (chain, own) = model.chain().arm(arm);
     if chain.is_urdf() {
         let (text, warnings) = model.to_urdf(arm, nominal_text, Path::new("model_text of the run"), p)?;
-        let text = sealed(&marked_xml(text)).into_owned();
+        let text = seal_text(&marked_xml(text)).into_owned();
         return Ok(ModelFile { name: URDF.into(), media_type: "application/xml", text, warnings });
     }
-    let text = sealed(&format!("# {MARK}\n\n{}", chain.to_dh_toml(&p[own])?)).into_owned();
+    let text = seal_text(&format!("# {MARK}\n\n{}", chain.to_dh_toml(&p[own])?)).into_owned();
     Ok(ModelFile { name: DH.into(), media_type: "application/toml", text, warnings: Vec::new() })
 }
 

@@ -53,7 +53,7 @@ pub struct Paired<'r> {
 }
 
 /// Pairs dwells by recording and time, each once.
-pub fn paired<'r>(before: &'r StoredRun, after: &'r StoredRun) -> Paired<'r> {
+pub fn pair_dwells<'r>(before: &'r StoredRun, after: &'r StoredRun) -> Paired<'r> {
     let (one, other) = (Times::of(before), Times::of(after));
     let same = |b: &StoredRecording| after.recordings.iter().map(|a| is_same(a, b)).collect::<Vec<bool>>();
     let same: Vec<Vec<bool>> = before.recordings.iter().map(same).collect();

@@ -32,7 +32,7 @@ pub fn extent(places: impl Iterator<Item = Vector3<f64>>) -> Option<(Vector3<f64
 
 /// The points of a run, in the order of its observations.
 pub fn points(run: &Run) -> Result<Vec<Point<'_>>, ResultError> {
-    check(run)?;
+    check_consistency(run)?;
     let fitted = run.calibration.fit.values();
     let nominal = &run.calibration.nominal_values;
     let without = run.steps.last().map(|step| (&step.model, step.values_without_effects(&run.model)));
@@ -57,7 +57,7 @@ pub fn points(run: &Run) -> Result<Vec<Point<'_>>, ResultError> {
 }
 
 /// Lengths and dwells that belong together do.
-fn check(run: &Run) -> Result<(), ResultError> {
+fn check_consistency(run: &Run) -> Result<(), ResultError> {
     let observations = &run.observations;
     let inconsistent = |what: String| Err(ResultError::Inconsistent(what));
     for calibration in std::iter::once(&run.calibration).chain(run.steps.iter().map(|step| &step.calibration))

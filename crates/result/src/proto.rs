@@ -55,12 +55,12 @@ impl_encode!(
 );
 
 /// Counts and indices as protobuf has them.
-pub fn count(n: usize) -> u32 {
+pub fn saturating_u32(n: usize) -> u32 {
     u32::try_from(n).unwrap_or(u32::MAX)
 }
 
 /// One parameter.
-pub fn parameter(e: &Estimate) -> Parameter {
+pub fn parameter_message(e: &Estimate) -> Parameter {
     let p = &e.parameter;
     let shown = |si: f64| p.unit.to_display(si);
     Parameter {

@@ -29,7 +29,7 @@ impl RecordedTime {
         }
         times_ns.iter_mut().for_each(|own| own.sort_unstable());
         let steps: Vec<f64> =
-            times_ns.iter().flat_map(|own| own.windows(2)).map(|w| min(w[1] - w[0])).collect();
+            times_ns.iter().flat_map(|own| own.windows(2)).map(|w| ns_to_min(w[1] - w[0])).collect();
         let step_min = if steps.is_empty() { 0.0 } else { median(&steps) };
         let mut order: Vec<usize> = (0..recordings).filter(|r| !times_ns[*r].is_empty()).collect();
         order.sort_by_key(|r| (times_ns[*r][0], *r));
@@ -38,7 +38,7 @@ impl RecordedTime {
         for r in order {
             let (first_ns, last_ns) = (times_ns[r][0], times_ns[r][times_ns[r].len() - 1]);
             begins[r] = Some((first_ns, elapsed_min));
-            elapsed_min += min(last_ns - first_ns) + step_min;
+            elapsed_min += ns_to_min(last_ns - first_ns) + step_min;
         }
         RecordedTime { begins, step_min }
     }
@@ -51,7 +51,7 @@ impl RecordedTime {
     /// Where a time in a recording stands [min].
     pub fn time_min(&self, recording: usize, time_ns: i64) -> f64 {
         let (first_ns, begin_min) = self.begins.get(recording).copied().flatten().unwrap_or_default();
-        begin_min + min(time_ns - first_ns)
+        begin_min + ns_to_min(time_ns - first_ns)
     }
 
     /// Between the recordings [min]: nothing that is averaged or drawn as a line reaches across.
@@ -66,7 +66,7 @@ impl RecordedTime {
     }
 }
 
-fn min(ns: i64) -> f64 {
+fn ns_to_min(ns: i64) -> f64 {
     ns as f64 / 60e9
 }
 

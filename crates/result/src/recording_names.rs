@@ -4,7 +4,7 @@
 //! `tool_shift@1.17`. Whoever reads a sentence knows neither the count nor the spelling, so every sentence for people goes
 //! through [`RecordingNames::in_words`]; files for programs keep the indices.
 
-use armcal_core::{Warning, printable};
+use armcal_core::{Warning, printable_name};
 use armcal_model::{Since, place_and_moment};
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct RecordingNames(Vec<String>);
 impl RecordingNames {
     /// In the order of the pipeline.
     pub fn new(names: impl IntoIterator<Item = String>) -> RecordingNames {
-        RecordingNames(names.into_iter().map(|name| printable(&name)).collect())
+        RecordingNames(names.into_iter().map(|name| printable_name(&name)).collect())
     }
 
     /// When an effect acts, in words that stand after its name: ` from dwell 17 of `roll` on`, ` in dwells 17 to 25 of `roll``,
@@ -106,9 +106,9 @@ impl RecordingNames {
 
     /// `recording 1 dwell 17` or `recording 1` at the beginning of a text, in words, and its length there.
     fn recording(&self, text: &str) -> Option<(String, usize)> {
-        let (index, after) = number(text.strip_prefix("recording ")?)?;
+        let (index, after) = leading_number(text.strip_prefix("recording ")?)?;
         let name = self.0.get(index)?;
-        match after.strip_prefix(" dwell ").and_then(number) {
+        match after.strip_prefix(" dwell ").and_then(leading_number) {
             Some((dwell, after)) => Some((format!("dwell {dwell} of `{name}`"), text.len() - after.len())),
             None => Some((format!("recording `{name}`"), text.len() - after.len())),
         }
@@ -127,7 +127,7 @@ impl RecordingNames {
 }
 
 /// The number that a text begins with, and what comes after it.
-fn number(text: &str) -> Option<(usize, &str)> {
+fn leading_number(text: &str) -> Option<(usize, &str)> {
     let end = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     Some((text[..end].parse().ok()?, &text[end..]))
 }

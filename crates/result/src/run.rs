@@ -362,7 +362,7 @@ impl RecordingRun {
 }
 
 /// Names of the physical effects in the model: the parts that own [`Role::Effect`] parameters.
-pub fn effects(calibration: &Calibration) -> Vec<&str> {
+pub fn effect_part_names(calibration: &Calibration) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
     for estimate in &calibration.fit.estimates {
         let part = estimate.parameter.name.rsplit_once('.').map_or("", |(part, _)| part);

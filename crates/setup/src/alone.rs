@@ -1,10 +1,10 @@
 //! Recordings of which each fits by itself and all together do not: what moved between them?
 
-use super::beyond::{FAR_M, FAR_RAD, apart};
-use super::trial::{Misfit, for_trials, misfit};
+use super::beyond::{FAR_M, FAR_RAD, pose_distance};
+use super::trial::{Misfit, compute_misfit, for_trials};
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use armcal_config::FramePose;
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use armcal_core::{Certainty, Pose, SetupFinding};
 use armcal_stages::{Fitted, Inputs};
 use rayon::prelude::*;
@@ -20,13 +20,13 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
         own.pipeline.frames.base.pose = FramePose::Estimated;
         own.seen.iter_mut().enumerate().filter(|(k, _)| *k != r).for_each(|(_, s)| s.dwells.clear());
         let fitted = own.fit().ok()?;
-        let misfit = misfit(&own, &fitted);
+        let misfit = compute_misfit(&own, &fitted);
         let base = fitted.model.base_in_world(&fitted.calibration.fit.values());
         (misfit.times_floor() < WORTH_LOOKING).then_some((misfit, base))
     };
     let alone: Vec<(Misfit, Pose)> =
         (0..inputs.seen.len()).into_par_iter().map(alone).collect::<Option<_>>()?;
-    let moves: Vec<(f64, f64)> = alone.windows(2).map(|w| apart(&w[0].1, &w[1].1)).collect();
+    let moves: Vec<(f64, f64)> = alone.windows(2).map(|w| pose_distance(&w[0].1, &w[1].1)).collect();
     let k = (0..moves.len()).max_by(|a, b| moves[*a].0.total_cmp(&moves[*b].0))?;
     let (m, rad) = moves[k];
     if m < FAR_M && rad < FAR_RAD {
@@ -44,11 +44,11 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
              arm's base moved by {} mm and turned by {:.2} deg as the sensor or the board sees it; the arm, the sensor or the board was moved, or \
              it is another arm or tool: give what was recorded after that a pipeline of its own (`armcal pool` fits them \
              together)",
-            millimetres(after_m),
-            millimetres(before_m),
+            format_mm(after_m),
+            format_mm(before_m),
             names[0],
             names[1],
-            millimetres(m),
+            format_mm(m),
             rad.to_degrees()
         ),
         certainty: Certainty::Mistake,

@@ -1,7 +1,7 @@
 //! Hypotheses fitted: each change, and of a change that holds a number the value that fits best.
 
 use super::hypotheses::{Freedom, Hypothesis, Number};
-use super::trial::{Misfit, misfit};
+use super::trial::{Misfit, compute_misfit};
 use super::weigh::{SAME_FACTOR, could_explain};
 use armcal_core::Observation;
 use armcal_stages::{Fitted, Inputs, Rounds, fit_places};
@@ -27,8 +27,8 @@ pub struct Tried {
 }
 
 /// Those of the hypotheses that can be fitted. `before` is the misfit without any.
-pub fn attempted(now: &Inputs, before: &Misfit, all: Vec<Hypothesis>) -> Vec<Tried> {
-    let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| attempt(now, before, h)).collect();
+pub fn fit_hypotheses(now: &Inputs, before: &Misfit, all: Vec<Hypothesis>) -> Vec<Tried> {
+    let mut tried: Vec<Tried> = all.into_par_iter().filter_map(|h| fit_hypothesis(now, before, h)).collect();
     refine_numbers(now, before, &mut tried);
     tried
 }
@@ -48,18 +48,18 @@ fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
         let best = values.into_iter().min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log));
         // A number that changes nothing fits as well at any value.
         let worth = best.filter(|best| best.misfit.log < before.log - SAME_FACTOR.ln());
-        tried.splice(place..place, worth.map(|best| refined(now, before, best)));
+        tried.splice(place..place, worth.map(|best| golden_section_search(now, before, best)));
     }
 }
 
 /// The best value of a number between the neighbours of the one that was tried, by golden section.
-fn refined(now: &Inputs, before: &Misfit, tried: Tried) -> Tried {
+fn golden_section_search(now: &Inputs, before: &Misfit, tried: Tried) -> Tried {
     let Some(number) = tried.hypothesis.number.clone() else { return tried };
     let ratio = (5f64.sqrt() - 1.0) / 2.0;
     let at = |value: f64| {
         let of_value = (number.at)(value);
         let number = Some(Number { value, ..number.clone() });
-        attempt(now, before, Hypothesis { number, freedom: Freedom::Number, ..of_value })
+        fit_hypothesis(now, before, Hypothesis { number, freedom: Freedom::Number, ..of_value })
     };
     // By the spread: of a scale, the plain mean is least at too small a one.
     let mean = |t: &Option<Tried>| t.as_ref().map_or(f64::INFINITY, |t| t.misfit.of_spread());
@@ -106,16 +106,16 @@ impl Rounds for Trial<'_> {
     }
 
     fn goes_on(&mut self, fitted: &Fitted) -> bool {
-        let now = misfit(self.inputs, fitted);
+        let now = compute_misfit(self.inputs, fitted);
         let seats = now.seated > self.before.seated;
         seats || now.of_spread() < self.before.of_spread() || now.log < self.before.log
     }
 }
 
 /// A hypothesis, fitted as far as it could still explain what is left without it.
-fn attempt(now: &Inputs, before: &Misfit, hypothesis: Hypothesis) -> Option<Tried> {
+fn fit_hypothesis(now: &Inputs, before: &Misfit, hypothesis: Hypothesis) -> Option<Tried> {
     let inputs = hypothesis.undone(now);
     let fitted = fit_places(&inputs, &mut Trial { inputs: &inputs, before }).ok()?;
-    let misfit = misfit(&inputs, &fitted);
+    let misfit = compute_misfit(&inputs, &fitted);
     Some(Tried { hypothesis, inputs, fitted, misfit })
 }

@@ -2,7 +2,7 @@
 
 use super::attempt::Tried;
 use super::hypotheses::{Freedom, Hypothesis};
-use super::trial::{Misfit, misfit};
+use super::trial::{Misfit, compute_misfit};
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use armcal_core::Pose;
 use armcal_model::{EffectSpec, EffectTable};
@@ -52,7 +52,7 @@ impl<'a> Physics<'a> {
                 }
                 "target-offset" => before.calibration.times_floor() > EXPLAINED,
                 code => {
-                    let by = moved(self.now, code, before, &t.fitted);
+                    let by = frame_displacement(self.now, code, before, &t.fitted);
                     by.is_none_or(|(m, rad)| m > FAR_M || rad > FAR_RAD) && !self.one_recording_differs()
                 }
             }),
@@ -61,7 +61,8 @@ impl<'a> Physics<'a> {
 
     /// Whether a change lets a frame go that is elsewhere than it was taken to be in every recording, near or far.
     pub fn leaves_standing(&self, t: &Tried) -> bool {
-        let moves = |before: &Fitted| moved(self.now, t.hypothesis.code, before, &t.fitted).is_some();
+        let moves =
+            |before: &Fitted| frame_displacement(self.now, t.hypothesis.code, before, &t.fitted).is_some();
         self.fitted.is_some_and(moves) && !self.one_recording_differs()
     }
 
@@ -79,33 +80,33 @@ impl<'a> Physics<'a> {
         let at =
             |event: &String, dwell: usize| times_floor(self.now, &format!("{event}@{recording}.{dwell}"));
         self.begins_with(recording)
-            || events(self.now)
+            || event_effects(self.now)
                 .iter()
-                .any(|event| explained(least_at_a_dwell(dwells, |dwell| at(event, dwell))))
+                .any(|event| is_explained(least_at_a_dwell(dwells, |dwell| at(event, dwell))))
     }
 
     fn begins_with(&self, recording: usize) -> bool {
-        let begins = |event: &String| explained(times_floor(self.now, &format!("{event}@{recording}")));
-        *self.begins[recording].get_or_init(|| events(self.now).iter().any(begins))
+        let begins = |event: &String| is_explained(times_floor(self.now, &format!("{event}@{recording}")));
+        *self.begins[recording].get_or_init(|| event_effects(self.now).iter().any(begins))
     }
 }
 
 /// How far one pose lies from another [m], [rad].
-pub fn apart(a: &Pose, b: &Pose) -> (f64, f64) {
+pub fn pose_distance(a: &Pose, b: &Pose) -> (f64, f64) {
     let by = a.inverse() * b;
     (by.translation.vector.norm(), by.rotation.angle())
 }
 
 /// How far the frame that a hypothesis estimates moves from one fit to the other [m], [rad]; the furthest over the
 /// recordings. None where it is not about a frame.
-pub fn moved(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f64, f64)> {
+pub fn frame_displacement(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f64, f64)> {
     let (a, b) = (&from.model, &to.model);
     let (p, q) = (from.calibration.fit.values(), to.calibration.fit.values());
     match code {
-        "base-frame" => Some(apart(&a.base_in_world(&p), &b.base_in_world(&q))),
-        "tool-frame" => Some(apart(&a.tip_in_last_link(&p), &b.tip_in_last_link(&q))),
+        "base-frame" => Some(pose_distance(&a.base_in_world(&p), &b.base_in_world(&q))),
+        "tool-frame" => Some(pose_distance(&a.tip_in_last_link(&p), &b.tip_in_last_link(&q))),
         "board-pose" => {
-            let of = |r: usize| Some(apart(&a.board_in_world(&p, r)?, &b.board_in_world(&q, r)?));
+            let of = |r: usize| Some(pose_distance(&a.board_in_world(&p, r)?, &b.board_in_world(&q, r)?));
             (0..now.seen.len()).filter_map(of).reduce(|x, y| (x.0.max(y.0), x.1.max(y.1)))
         }
         _ => None,
@@ -113,7 +114,7 @@ pub fn moved(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f6
 }
 
 /// What happens to an arm at one moment: a tool or frame is shifted, a zero slips.
-fn events(now: &Inputs) -> Vec<String> {
+fn event_effects(now: &Inputs) -> Vec<String> {
     let zeros = (1..=now.chain.joint_names().len()).map(|j| format!("zero_slip:{j}"));
     ["tool_shift", "frame_shift", "board_shift"].map(str::to_owned).into_iter().chain(zeros).collect()
 }
@@ -122,7 +123,7 @@ fn times_floor(now: &Inputs, since: &str) -> Option<f64> {
     Some(with_effect(now, since)?.times_floor())
 }
 
-fn explained(times_floor: Option<f64>) -> bool {
+fn is_explained(times_floor: Option<f64>) -> bool {
     times_floor.is_some_and(|floors| floors < WORTH_LOOKING)
 }
 
@@ -132,7 +133,7 @@ fn with_effect(now: &Inputs, name: &str) -> Option<Misfit> {
     let mut inputs = now.clone();
     inputs.pipeline.effects.push(EffectTable::from(&spec));
     let fitted = inputs.fit().ok()?;
-    Some(misfit(&inputs, &fitted))
+    Some(compute_misfit(&inputs, &fitted))
 }
 
 /// The least of what an event at one of the dwells leaves, by halving the stride around the best of a coarse grid: what an

@@ -6,7 +6,7 @@ use super::spread::spread_m;
 use super::trial::Misfit;
 use super::weigh::{SAME_FACTOR, in_doubt};
 use armcal_calibrate::Calibration;
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use armcal_core::{Certainty, SetupFinding};
 use armcal_stages::{Fitted, Inputs};
 
@@ -34,10 +34,10 @@ impl Side<'_> {
 }
 
 /// What changes do, in a clause; none where they improve nothing that is judged.
-pub fn gain(before: &Side<'_>, after: &Side<'_>) -> Option<String> {
+pub fn describe_gain(before: &Side<'_>, after: &Side<'_>) -> Option<String> {
     let (begun, ended, after_m) = (&before.trial, &after.trial, after.mean_m());
     let Some(fitted) = before.fitted else {
-        let mean = millimetres(after_m);
+        let mean = format_mm(after_m);
         return Some(match begun.used {
             0 => format!("{} dwells find their place, with a mean error of {mean} mm", ended.used),
             _ => format!("the mean error is {mean} mm"),
@@ -46,25 +46,30 @@ pub fn gain(before: &Side<'_>, after: &Side<'_>) -> Option<String> {
     let held_out = if fitted.calibration.held_out() { "held-out " } else { "" };
     let seats = || {
         (ended.seated > begun.seated).then(|| {
-            let (n, instead, mean) = (ended.seated, begun.seated, millimetres(after_m));
+            let (n, instead, mean) = (ended.seated, begun.seated, format_mm(after_m));
             format!(
                 "{n} instead of {instead} dwells sit in a cavity, and their mean {held_out}error is {mean} mm"
             )
         })
     };
-    falls([before.mean_m(), after_m], [before.spread_m(), after.spread_m()], held_out).or_else(seats)
+    describe_error_reduction([before.mean_m(), after_m], [before.spread_m(), after.spread_m()], held_out)
+        .or_else(seats)
 }
 
 /// That the error fell, by more than rounding, against the spread of what was measured.
-fn falls([before_m, after_m]: [f64; 2], spreads_m: [f64; 2], held_out: &str) -> Option<String> {
+fn describe_error_reduction(
+    [before_m, after_m]: [f64; 2],
+    spreads_m: [f64; 2],
+    held_out: &str,
+) -> Option<String> {
     // The errors after, as they would be if the data were as large as before.
     let alike_m = after_m * spreads_m[0] / spreads_m[1];
-    let [was, is, would_be] = [before_m, after_m, alike_m].map(millimetres);
+    let [was, is, would_be] = [before_m, after_m, alike_m].map(format_mm);
     let fell = before_m > SAME_FACTOR * alike_m && was != would_be;
     fell.then(|| match after_m < before_m && was != is {
         true => format!("the mean {held_out}error falls from {was} to {is} mm"),
         false => {
-            let [from, to] = spreads_m.map(millimetres);
+            let [from, to] = spreads_m.map(format_mm);
             format!(
                 "the mean {held_out}error is {is} mm of positions that spread by {to} mm, instead of {was} of {from} mm"
             )
@@ -73,7 +78,7 @@ fn falls([before_m, after_m]: [f64; 2], spreads_m: [f64; 2], held_out: &str) -> 
 }
 
 /// A change that explains the errors, as it is reported; `together` is everything that was found, and `gain` what that does.
-pub fn finding(
+pub fn setup_finding(
     h: &Hypothesis,
     (together, gain): (&str, &str),
     alternatives: &[String],
@@ -82,9 +87,10 @@ pub fn finding(
 ) -> SetupFinding {
     let or = match alternatives.is_empty() {
         true => String::new(),
-        false => format!(" (these data cannot tell it from: {})", armcal_core::listed(alternatives)),
+        false => format!(" (these data cannot tell it from: {})", armcal_core::list_names(alternatives)),
     };
-    let ends = moved.unwrap_or_else(|| after.fitted.map_or(String::new(), |f| estimated(h, &f.calibration)));
+    let ends = moved
+        .unwrap_or_else(|| after.fitted.map_or(String::new(), |f| describe_estimates(h, &f.calibration)));
     SetupFinding {
         code: h.code.into(),
         subject: h.subject.clone(),
@@ -98,7 +104,7 @@ pub fn finding(
 }
 
 /// Where the parameters of a change come out, the furthest first.
-fn estimated(h: &Hypothesis, c: &Calibration) -> String {
+fn describe_estimates(h: &Hypothesis, c: &Calibration) -> String {
     let of = |own: &Estimated| {
         let e = c.fit.estimates.iter().find(|e| e.parameter.name == own.parameter)?;
         let (unit, off) = (e.parameter.unit, e.value - own.nominal);
@@ -115,11 +121,11 @@ fn estimated(h: &Hypothesis, c: &Calibration) -> String {
 
 /// How far the frame that a change estimates moves, in words.
 pub fn moved_frame(now: &Inputs, h: &Hypothesis, from: &Fitted, to: &Fitted) -> Option<String> {
-    let (m, rad) = beyond::moved(now, h.code, from, to)?;
+    let (m, rad) = beyond::frame_displacement(now, h.code, from, to)?;
     Some(format!(
         " ({} moved by {} mm and turned by {:.2} deg from where it was taken to be)",
         h.subject,
-        millimetres(m),
+        format_mm(m),
         rad.to_degrees()
     ))
 }
@@ -130,8 +136,9 @@ mod tests {
 
     #[test]
     fn an_error_falls_only_by_more_than_rounding_and_by_the_spread_of_the_data() {
-        let told =
-            |errors_mm: [f64; 2], spreads_m| falls(errors_mm.map(|mm| mm * 1e-3), spreads_m, "held-out ");
+        let told = |errors_mm: [f64; 2], spreads_m| {
+            describe_error_reduction(errors_mm.map(|mm| mm * 1e-3), spreads_m, "held-out ")
+        };
         let same = [0.5, 0.5];
         assert_eq!(
             told([353.01, 0.13], same).expect("it falls"),

@@ -27,13 +27,13 @@ use armcal_stages::{Fitted, Inputs};
 
 /// Looks for mistakes in the inputs of a calibration.
 pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
-    let sound = facts::sound(fitted);
-    let mut report = led_by(facts::evident(inputs, sound), inputs, Some(fitted));
+    let sound = facts::is_sound(fitted);
+    let mut report = led_by(facts::evident_mistakes(inputs, sound), inputs, Some(fitted));
     // What a mistake does to tilts and frames is its consequence.
     report.findings.extend(match sound {
-        true if report.findings.is_empty() => facts::declared(inputs, fitted),
+        true if report.findings.is_empty() => facts::contradicted_declarations(inputs, fitted),
         true => Vec::new(),
-        false => facts::doubtful(inputs),
+        false => facts::suspect_readings(inputs),
     });
     report.findings.sort_by_key(|f| std::cmp::Reverse(f.certainty));
     report
@@ -41,8 +41,8 @@ pub fn examine(inputs: &Inputs, fitted: &Fitted) -> SetupReport {
 
 /// The same for inputs that could not be calibrated at all.
 pub fn examine_failed(inputs: &Inputs) -> SetupReport {
-    let mut seen = facts::evident(inputs, false);
-    seen.extend(facts::doubtful(inputs));
+    let mut seen = facts::evident_mistakes(inputs, false);
+    seen.extend(facts::suspect_readings(inputs));
     led_by(seen, inputs, None)
 }
 
@@ -51,7 +51,7 @@ pub fn examine_failed(inputs: &Inputs) -> SetupReport {
 fn led_by(seen: Vec<SetupFinding>, inputs: &Inputs, fitted: Option<&Fitted>) -> SetupReport {
     let mut report = SetupReport { findings: seen, ..SetupReport::default() };
     if report.mistakes().next().is_none() {
-        search::search(inputs, fitted, &mut report);
+        search::find_mistakes(inputs, fitted, &mut report);
     }
     report
 }

@@ -1,13 +1,16 @@
 //! Every hypothesis against the inputs as they are: which one change explains the errors?
 
 use super::alone::each_alone;
-use super::attempt::{Tried, attempted};
+use super::attempt::{Tried, fit_hypotheses};
 use super::beyond::Physics;
-use super::describe::{Side, finding, gain, moved_frame};
-use super::hypotheses::{Freedom, Hypothesis, hypotheses};
-use super::trial::{Misfit, for_trials, misfit};
-use super::unseen::unseen;
-use super::weigh::{ALIKE_FACTOR, at_the_floor, best, explains, far_enough, in_doubt, outdone, sure};
+use super::describe::{Side, describe_gain, moved_frame, setup_finding};
+use super::hypotheses::{Freedom, Hypothesis, hypotheses_by_rarity};
+use super::trial::{Misfit, compute_misfit, for_trials};
+use super::unseen::untestable_sign;
+use super::weigh::{
+    ALIKE_FACTOR, at_the_floor, explains_errors, far_enough, in_doubt, is_certain, most_parsimonious,
+    physics_explains_better,
+};
 use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
 use armcal_stages::{Fitted, Inputs};
 
@@ -21,12 +24,12 @@ type Found = (Hypothesis, Vec<String>);
 
 /// Searches one mistake after the other while each divides the errors, and adds what it finds to the report.
 /// `fitted` is the calibration as it came; none where there was no way to calibrate.
-pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport) {
+pub fn find_mistakes(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport) {
     let now = for_trials(inputs, fitted);
     let first = now.fit().ok();
-    let begun = first.as_ref().map_or_else(Misfit::of_nothing, |f| misfit(&now, f));
+    let begun = first.as_ref().map_or_else(Misfit::of_nothing, |f| compute_misfit(&now, f));
     if !in_doubt(&begun) {
-        report.not_testable.extend(unseen(&now, &begun));
+        report.not_testable.extend(untestable_sign(&now, &begun));
         return;
     }
     let mut possible = Vec::new();
@@ -35,10 +38,10 @@ pub fn search(inputs: &Inputs, fitted: Option<&Fitted>, report: &mut SetupReport
     let alone = fitted.filter(|_| found.is_empty() || one_recording);
     let sure = match alone.and_then(|fitted| each_alone(inputs, fitted, &begun)) {
         Some(finding) => vec![finding],
-        None => told(inputs, fitted, &found, (begun, ended)),
+        None => confirm_mistakes(inputs, fitted, &found, (begun, ended)),
     };
     if sure.is_empty() {
-        report.findings.extend(fitted.and_then(|f| perhaps(inputs, f, &begun, &possible)));
+        report.findings.extend(fitted.and_then(|f| possible_explanation(inputs, f, &begun, &possible)));
     }
     report.findings.extend(sure);
 }
@@ -58,21 +61,25 @@ fn one_upon_the_other(
             first.as_ref().map(|f| HOPELESS * f.calibration.judged().nominal.mean_m);
         let (mut tried, mut within) = (Vec::new(), Vec::new());
         let physics = Physics::of(&now, first.as_ref());
-        for some in hypotheses(&now, &at_bound) {
+        for some in hypotheses_by_rarity(&now, &at_bound) {
             // A frame that is let go takes a share of anything: what is rarer may still fit better.
             if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {
                 report.tried += some.len();
-                let all = attempted(&now, &before, some);
-                let (far, near) = explaining(&physics, &before, all, possible);
+                let all = fit_hypotheses(&now, &before, some);
+                let (far, near) = classify_explanations(&physics, &before, all, possible);
                 tried.extend(far);
                 within.extend(near);
             }
         }
-        let weights: Vec<(Freedom, f64)> = tried.iter().map(weight).collect();
-        let Some(best) = best(&weights).filter(|k| !outdone(weights[*k], &within)) else { break };
+        let weights: Vec<(Freedom, f64)> = tried.iter().map(freedom_and_misfit).collect();
+        let Some(best) =
+            most_parsimonious(&weights).filter(|k| !physics_explains_better(weights[*k], &within))
+        else {
+            break;
+        };
         let (freedom, log) = weights[best];
         let alike = |t: &&Tried| {
-            let (other, other_log) = weight(t);
+            let (other, other_log) = freedom_and_misfit(t);
             other == freedom && (other_log - log).abs() < ALIKE_FACTOR.ln()
         };
         let own = &tried[best].hypothesis.change;
@@ -89,7 +96,7 @@ fn one_upon_the_other(
 
 /// What was found as it is reported: everything undone together on all dwells and the pipeline's own hold-out gives the
 /// numbers. Nothing where that improves nothing, whatever a quick fit said.
-fn told(
+fn confirm_mistakes(
     inputs: &Inputs,
     fitted: Option<&Fitted>,
     found: &[Found],
@@ -103,35 +110,40 @@ fn told(
     let after = mended.fit().ok();
     let together = found.iter().map(|(h, _)| h.change.as_str()).collect::<Vec<_>>().join(" and ");
     let sides = (&Side { fitted, trial: begun }, &Side { fitted: after.as_ref(), trial: ended });
-    let Some(gain) = gain(sides.0, sides.1) else { return Vec::new() };
+    let Some(gain) = describe_gain(sides.0, sides.1) else { return Vec::new() };
     let one = |(h, alternatives): &Found| {
         let moved = fitted.zip(after.as_ref()).and_then(|(from, to)| moved_frame(&mended, h, from, to));
-        finding(h, (&together, &gain), alternatives, moved, sides)
+        setup_finding(h, (&together, &gain), alternatives, moved, sides)
     };
     found.iter().map(one).collect()
 }
 
 /// The change of a frame or of the model's own parameters that would explain as much as a physical effect: told beside its name.
-fn perhaps(inputs: &Inputs, fitted: &Fitted, begun: &Misfit, possible: &[Tried]) -> Option<SetupFinding> {
-    let weights: Vec<(Freedom, f64)> = possible.iter().map(weight).collect();
-    let Tried { hypothesis, misfit, .. } = &possible[best(&weights)?];
+fn possible_explanation(
+    inputs: &Inputs,
+    fitted: &Fitted,
+    begun: &Misfit,
+    possible: &[Tried],
+) -> Option<SetupFinding> {
+    let weights: Vec<(Freedom, f64)> = possible.iter().map(freedom_and_misfit).collect();
+    let Tried { hypothesis, misfit, .. } = &possible[most_parsimonious(&weights)?];
     let mended = hypothesis.undone(inputs).fit().ok()?;
     let moved = moved_frame(inputs, hypothesis, fitted, &mended);
     let before = Side { fitted: Some(fitted), trial: *begun };
     let after = Side { fitted: Some(&mended), trial: *misfit };
-    let gain = gain(&before, &after)?;
-    let finding = finding(hypothesis, (&hypothesis.change, &gain), &[], moved, (&before, &after));
+    let gain = describe_gain(&before, &after)?;
+    let finding = setup_finding(hypothesis, (&hypothesis.change, &gain), &[], moved, (&before, &after));
     Some(SetupFinding { certainty: Certainty::Possible, ..finding })
 }
 
-fn weight(t: &Tried) -> (Freedom, f64) {
+fn freedom_and_misfit(t: &Tried) -> (Freedom, f64) {
     (t.hypothesis.freedom, t.misfit.log)
 }
 
 /// Those that explain the errors; of what explains them with a number that physics reaches, freedom and misfit. Where too
 /// little was above the floor to be sure, frames and changes of the model's own parameters are `possible`, and so are frames that
 /// are no further off than physics may have it.
-fn explaining(
+fn classify_explanations(
     physics: &Physics<'_>,
     before: &Misfit,
     tried: Vec<Tried>,
@@ -139,16 +151,18 @@ fn explaining(
 ) -> (Vec<Tried>, Vec<(Freedom, f64)>) {
     let (mut far, mut within) = (Vec::new(), Vec::new());
     for t in tried {
-        let explains = explains(before, &t.misfit) && far_enough(before, t.hypothesis.freedom, &t.misfit);
+        let explains =
+            explains_errors(before, &t.misfit) && far_enough(before, t.hypothesis.freedom, &t.misfit);
         let perhaps = t.hypothesis.of_the_model() && at_the_floor(before, &t.misfit);
         if !(explains || perhaps) {
             continue;
         }
-        let certain = explains && (t.hypothesis.recording.is_some() || sure(before, t.hypothesis.freedom));
+        let certain =
+            explains && (t.hypothesis.recording.is_some() || is_certain(before, t.hypothesis.freedom));
         match (physics.is_outdone_by(&t), certain) {
             (true, true) => far.push(t),
             (true, false) => possible.push(t),
-            (false, true) if t.hypothesis.number.is_some() => within.push(weight(&t)),
+            (false, true) if t.hypothesis.number.is_some() => within.push(freedom_and_misfit(&t)),
             (false, true) if physics.leaves_standing(&t) => possible.push(t),
             (false, _) => {}
         }

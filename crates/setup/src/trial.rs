@@ -40,14 +40,14 @@ pub struct Misfit {
 }
 
 /// The logarithm of an error over its expectation, flat at both ends.
-fn saturating(ratio: f64) -> f64 {
+fn saturating_log(ratio: f64) -> f64 {
     0.5 * (1.0 + ratio.min(CAP).powi(2)).ln()
 }
 
 impl Misfit {
     /// Of inputs that cannot be fitted.
     pub fn of_nothing() -> Misfit {
-        let log = saturating(CAP);
+        let log = saturating_log(CAP);
         Misfit { log, mean_m: f64::INFINITY, floor_m: 0.0, spread_m: 1.0, used: 0, seated: 0, homeless: 0 }
     }
 
@@ -64,7 +64,7 @@ impl Misfit {
 }
 
 /// The bounds that a calibration had to widen.
-fn widened(fitted: &Fitted) -> Vec<Change> {
+fn widened_bounds(fitted: &Fitted) -> Vec<Change> {
     let assumed = fitted.model.parameters().iter();
     let taken = fitted.calibration.fit.estimates.iter().map(|e| &e.parameter);
     let width = |p: &Parameter| p.upper - p.lower;
@@ -80,7 +80,7 @@ fn widened(fitted: &Fitted) -> Vec<Change> {
 /// there is one, found them.
 pub fn for_trials(inputs: &Inputs, calibrated: Option<&Fitted>) -> Inputs {
     let mut inputs = inputs.clone();
-    inputs.changes.extend(calibrated.into_iter().flat_map(widened));
+    inputs.changes.extend(calibrated.into_iter().flat_map(widened_bounds));
     inputs.pipeline.holdout = HoldoutConfig::None;
     if inputs.pipeline.fit.objective == Objective::Paper {
         inputs.pipeline.fit.objective = Objective::Robust;
@@ -107,16 +107,16 @@ pub fn for_trials(inputs: &Inputs, calibrated: Option<&Fitted>) -> Inputs {
 }
 
 /// How badly a fit of these inputs fits.
-pub fn misfit(inputs: &Inputs, fitted: &Fitted) -> Misfit {
+pub fn compute_misfit(inputs: &Inputs, fitted: &Fitted) -> Misfit {
     let used: BTreeSet<_> = fitted.observations.iter().map(|o| o.dwell).collect();
     let residuals = &fitted.calibration.residuals;
-    let of_used: f64 = residuals.iter().map(|r| saturating(r.fitted_m.norm() / r.expected_norm_m)).sum();
+    let of_used: f64 = residuals.iter().map(|r| saturating_log(r.fitted_m.norm() / r.expected_norm_m)).sum();
     let total = inputs.dwells().count();
     let unused = total.saturating_sub(used.len()) as f64;
     let n = residuals.len().max(1) as f64;
     let places = |of: &dyn Fn(&Place) -> bool| fitted.places().filter(|place| of(place)).count();
     Misfit {
-        log: (of_used + unused * saturating(CAP)) / total.max(1) as f64,
+        log: (of_used + unused * saturating_log(CAP)) / total.max(1) as f64,
         mean_m: residuals.iter().map(|r| r.fitted_m.norm()).sum::<f64>() / n,
         floor_m: residuals.iter().map(|r| r.expected_norm_m).sum::<f64>() / n,
         spread_m: spread_m(&fitted.observations),

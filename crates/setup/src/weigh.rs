@@ -39,7 +39,7 @@ pub fn in_doubt(m: &Misfit) -> bool {
 }
 
 /// Whether a change divides the errors as only the right one does; or lets far more dwells be used, no worse.
-pub fn explains(before: &Misfit, after: &Misfit) -> bool {
+pub fn explains_errors(before: &Misfit, after: &Misfit) -> bool {
     // Dwells that fit as they are, and dwells that no change can place, hide in a mean of logarithms what happens to the
     // rest: then no dwell may be lost for it.
     let keeps = after.used >= before.used && after.homeless <= before.homeless && after.log < before.log;
@@ -73,7 +73,7 @@ pub fn far_enough(before: &Misfit, freedom: Freedom, after: &Misfit) -> bool {
 
 /// Whether errors are so large that what explains them with this freedom is a mistake and no share that it takes of
 /// something physical.
-pub fn sure(before: &Misfit, freedom: Freedom) -> bool {
+pub fn is_certain(before: &Misfit, freedom: Freedom) -> bool {
     freedom != Freedom::Frame || before.times_floor() >= FRAMES_FROM
 }
 
@@ -84,7 +84,7 @@ pub fn at_the_floor(before: &Misfit, after: &Misfit) -> bool {
 }
 
 /// Whether physics, `within` its bounds, explains the errors with less freedom than what is believed, or better.
-pub fn outdone((freedom, log): (Freedom, f64), within: &[(Freedom, f64)]) -> bool {
+pub fn physics_explains_better((freedom, log): (Freedom, f64), within: &[(Freedom, f64)]) -> bool {
     within.iter().any(|(own, own_log)| match own.cmp(&freedom) {
         Ordering::Less => *own_log <= log + LEAST_FACTOR.ln() / 2.0,
         Ordering::Equal => *own_log < log - ALIKE_FACTOR.ln(),
@@ -93,7 +93,7 @@ pub fn outdone((freedom, log): (Freedom, f64), within: &[(Freedom, f64)]) -> boo
 }
 
 /// The least freedom that comes within reach of the best fit; `tried` are freedoms and logarithmic misfits.
-pub fn best(tried: &[(Freedom, f64)]) -> Option<usize> {
+pub fn most_parsimonious(tried: &[(Freedom, f64)]) -> Option<usize> {
     let lowest = |of: &[usize]| of.iter().map(|k| tried[*k].1).min_by(f64::total_cmp);
     let all: Vec<usize> = (0..tried.len()).collect();
     let reach = lowest(&all)? + LEAST_FACTOR.ln() / 2.0;
@@ -136,15 +136,15 @@ mod tests {
     #[test]
     fn a_third_of_the_error_explains_and_a_little_more_does_not() {
         let before = seated(100, 30.0);
-        assert!(explains(&before, &seated(100, 9.99)));
-        assert!(!explains(&before, &seated(100, 10.01)));
+        assert!(explains_errors(&before, &seated(100, 9.99)));
+        assert!(!explains_errors(&before, &seated(100, 10.01)));
     }
 
     #[test]
     fn where_nothing_was_fitted_a_handful_of_dwells_explains_nothing() {
-        assert!(!explains(&Misfit::of_nothing(), &seated(9, 1.0)));
-        assert!(explains(&Misfit::of_nothing(), &seated(10, 1.0)));
-        assert!(explains(&seated(5, 30.0), &seated(5, 1.0)));
+        assert!(!explains_errors(&Misfit::of_nothing(), &seated(9, 1.0)));
+        assert!(explains_errors(&Misfit::of_nothing(), &seated(10, 1.0)));
+        assert!(explains_errors(&seated(5, 30.0), &seated(5, 1.0)));
     }
 
     #[test]
@@ -152,13 +152,13 @@ mod tests {
         // A few dwells dominate the mean; the logarithm of the others hardly moves.
         let before = Misfit { log: 1.0, ..seated(100, 30.0) };
         let kept = Misfit { log: 0.9, ..seated(100, 5.0) };
-        assert!(explains(&before, &kept));
-        assert!(!explains(&before, &Misfit { used: 99, ..kept }), "it lost a dwell");
-        assert!(!explains(&before, &Misfit { homeless: 1, ..kept }), "one has no place now");
-        assert!(!explains(&before, &Misfit { log: 1.0, ..kept }), "the others are no better");
-        assert!(!explains(&before, &Misfit { mean_m: 1.1e-3, ..kept }), "the mean fell too little");
+        assert!(explains_errors(&before, &kept));
+        assert!(!explains_errors(&before, &Misfit { used: 99, ..kept }), "it lost a dwell");
+        assert!(!explains_errors(&before, &Misfit { homeless: 1, ..kept }), "one has no place now");
+        assert!(!explains_errors(&before, &Misfit { log: 1.0, ..kept }), "the others are no better");
+        assert!(!explains_errors(&before, &Misfit { mean_m: 1.1e-3, ..kept }), "the mean fell too little");
         let divided = Misfit { log: 1.0 - 3.01f64.ln(), used: 80, ..seated(80, 5.0) };
-        assert!(explains(&before, &divided), "every error is a third: dwells may change their places");
+        assert!(explains_errors(&before, &divided), "every error is a third: dwells may change their places");
     }
 
     #[test]
@@ -167,21 +167,21 @@ mod tests {
         assert!(could_explain(&before, 2.0 - 1.01 * 3f64.ln()));
         assert!(!could_explain(&before, 2.0 - 0.99 * 3f64.ln()));
         let after = Misfit { log: 2.0 - 0.99 * 3f64.ln(), ..seated(60, 5.0) };
-        assert!(!explains(&before, &after), "what could not explain does not");
+        assert!(!explains_errors(&before, &after), "what could not explain does not");
     }
 
     #[test]
     fn seating_far_more_dwells_explains_if_they_sit_well() {
         let before = Misfit { seated: 50, homeless: 50, ..seated(50, 1.2) };
         let after = Misfit { homeless: 0, ..seated(70, 1.4) };
-        assert!(explains(&before, &after));
-        assert!(!explains(&before, &Misfit { seated: 69, ..after }), "less than 1.4 times as many");
-        assert!(!explains(&before, &Misfit { homeless: 50, ..after }), "as many have no place");
-        assert!(!explains(&before, &Misfit { mean_m: 1.6e-4, ..after }), "they do not sit well");
+        assert!(explains_errors(&before, &after));
+        assert!(!explains_errors(&before, &Misfit { seated: 69, ..after }), "less than 1.4 times as many");
+        assert!(!explains_errors(&before, &Misfit { homeless: 50, ..after }), "as many have no place");
+        assert!(!explains_errors(&before, &Misfit { mean_m: 1.6e-4, ..after }), "they do not sit well");
         let coarse = Misfit { mean_m: 4e-4, ..before };
-        assert!(explains(&coarse, &Misfit { mean_m: 4e-4, ..after }), "no worse than before");
+        assert!(explains_errors(&coarse, &Misfit { mean_m: 4e-4, ..after }), "no worse than before");
         assert!(
-            !explains(&Misfit { seated: 0, ..before }, &after),
+            !explains_errors(&Misfit { seated: 0, ..before }, &after),
             "of none, any number is many times as much"
         );
     }
@@ -204,13 +204,13 @@ mod tests {
     #[test]
     fn the_least_freedom_within_reach_is_believed_and_the_first_of_those_alike() {
         use Freedom::{Discrete, Frame, Number};
-        assert_eq!(best(&[]), None);
+        assert_eq!(most_parsimonious(&[]), None);
         // exp(0.5 ln 3) = 1.73 is the reach of the lesser freedom.
-        assert_eq!(best(&[(Frame, 0.0), (Number, 0.54), (Discrete, 0.56)]), Some(1));
-        assert_eq!(best(&[(Frame, 0.0), (Number, 0.56), (Discrete, 0.54)]), Some(2));
+        assert_eq!(most_parsimonious(&[(Frame, 0.0), (Number, 0.54), (Discrete, 0.56)]), Some(1));
+        assert_eq!(most_parsimonious(&[(Frame, 0.0), (Number, 0.56), (Discrete, 0.54)]), Some(2));
         // Within a factor of 1.3 (0.262) the first in the list.
-        assert_eq!(best(&[(Discrete, 0.26), (Discrete, 0.0)]), Some(0));
-        assert_eq!(best(&[(Discrete, 0.27), (Discrete, 0.0)]), Some(1));
+        assert_eq!(most_parsimonious(&[(Discrete, 0.26), (Discrete, 0.0)]), Some(0));
+        assert_eq!(most_parsimonious(&[(Discrete, 0.27), (Discrete, 0.0)]), Some(1));
     }
 
     #[test]
@@ -224,18 +224,29 @@ mod tests {
 
     #[test]
     fn frames_are_sure_of_large_errors_only() {
-        assert!(sure(&seated(100, 1.5), Freedom::Discrete) && sure(&seated(100, 1.5), Freedom::Number));
-        assert!(!sure(&seated(100, 4.99), Freedom::Frame) && sure(&seated(100, 5.0), Freedom::Frame));
-        assert!(sure(&Misfit::of_nothing(), Freedom::Frame));
+        assert!(
+            is_certain(&seated(100, 1.5), Freedom::Discrete)
+                && is_certain(&seated(100, 1.5), Freedom::Number)
+        );
+        assert!(
+            !is_certain(&seated(100, 4.99), Freedom::Frame) && is_certain(&seated(100, 5.0), Freedom::Frame)
+        );
+        assert!(is_certain(&Misfit::of_nothing(), Freedom::Frame));
     }
 
     #[test]
     fn physics_outdoes_with_less_freedom_or_a_better_fit() {
         use Freedom::{Discrete, Frame, Number};
-        assert!(!outdone((Frame, 0.0), &[]));
-        assert!(outdone((Frame, 0.0), &[(Number, 0.54)]) && !outdone((Frame, 0.0), &[(Number, 0.56)]));
-        assert!(outdone((Number, 0.0), &[(Number, -0.27)]) && !outdone((Number, 0.0), &[(Number, -0.26)]));
-        assert!(!outdone((Discrete, 0.0), &[(Number, -3.0), (Frame, -3.0)]));
+        assert!(!physics_explains_better((Frame, 0.0), &[]));
+        assert!(
+            physics_explains_better((Frame, 0.0), &[(Number, 0.54)])
+                && !physics_explains_better((Frame, 0.0), &[(Number, 0.56)])
+        );
+        assert!(
+            physics_explains_better((Number, 0.0), &[(Number, -0.27)])
+                && !physics_explains_better((Number, 0.0), &[(Number, -0.26)])
+        );
+        assert!(!physics_explains_better((Discrete, 0.0), &[(Number, -3.0), (Frame, -3.0)]));
     }
 
     proptest! {
@@ -245,7 +256,7 @@ mod tests {
         ) {
             let all = [Freedom::Discrete, Freedom::Number, Freedom::Frame];
             let tried: Vec<_> = logs.iter().map(|(f, log)| (all[*f], *log)).collect();
-            let chosen = best(&tried).expect("there is one");
+            let chosen = most_parsimonious(&tried).expect("there is one");
             let lowest = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
             prop_assert!(tried[chosen].1 <= lowest + 0.5 * 3f64.ln() + 1e-12);
         }
@@ -260,15 +271,15 @@ mod tests {
             let (before, after) = (seated(n, before), seated(n, after));
             // Where the two are alike, rounding decides.
             prop_assume!((before.of_spread() / after.of_spread() / LEAST_FACTOR - 1.0).abs() > 1e-9);
-            prop_assert_eq!(explains(&before, &scaled(after)), explains(&before, &after));
-            prop_assert!(!explains(&before, &scaled(before)), "nothing but the scale is another");
+            prop_assert_eq!(explains_errors(&before, &scaled(after)), explains_errors(&before, &after));
+            prop_assert!(!explains_errors(&before, &scaled(before)), "nothing but the scale is another");
             let in_one_point = Misfit { spread_m: after.mean_m, ..after };
-            prop_assert!(!explains(&Misfit::of_nothing(), &in_one_point));
+            prop_assert!(!explains_errors(&Misfit::of_nothing(), &in_one_point));
         }
 
         #[test]
         fn nothing_that_got_worse_explains(before in 1.0f64..300.0, worse in 1.0f64..10.0, n in 1usize..300) {
-            prop_assert!(!explains(&seated(n, before), &seated(n, before * worse)));
+            prop_assert!(!explains_errors(&seated(n, before), &seated(n, before * worse)));
         }
     }
 }

@@ -8,7 +8,7 @@ use armcal_model::{Model, Override, is_of_effect};
 const SURELY: f64 = 5.0;
 
 /// What the pipeline says of sensor and parameters.
-pub fn declare(model: &mut Model, pipeline: &Pipeline) -> Result<(), RunError> {
+pub fn declare_parameters(model: &mut Model, pipeline: &Pipeline) -> Result<(), RunError> {
     if let Some(sigma_ppm) = pipeline.sensor.scale_sigma_ppm {
         let sigma = sigma_ppm * 1e-6;
         let known = match sigma > 0.0 {

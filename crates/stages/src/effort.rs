@@ -1,7 +1,7 @@
 //! Joints whose effort is measured in some dwells only: what follows it cannot be told in the others.
 
 use crate::seen::RecordingData;
-use armcal_core::{Dwell, Severity, Stage, Warning, listed};
+use armcal_core::{Dwell, Severity, Stage, Warning, list_names};
 use std::collections::BTreeMap;
 
 /// Says of each recording which joints have dwells without a measured effort, where any joint of any recording has one at all.
@@ -17,16 +17,17 @@ pub fn warn_of_gaps(joints: &[String], seen: &mut [RecordingData]) {
             by_count.entry(without).or_default().push(joint.clone());
         }
         by_count.remove(&0);
-        seen.warnings.extend(by_count.iter().map(|(without, names)| gap(*without, seen.dwells.len(), names)));
+        seen.warnings
+            .extend(by_count.iter().map(|(without, names)| gap_warning(*without, seen.dwells.len(), names)));
     }
 }
 
-fn gap(without: usize, dwells: usize, joints: &[String]) -> Warning {
+fn gap_warning(without: usize, dwells: usize, joints: &[String]) -> Warning {
     let said = format!(
         "{without} of {dwells} dwells have no measured effort of it: no effect can follow it (effort_compliance, a formula over \
          it), in this recording or beside it; joints that have theirs are not touched. Record the effort, or calibrate without \
          such dwells"
     );
-    let subject = format!("effort of {}", listed(joints));
+    let subject = format!("effort of {}", list_names(joints));
     Warning::new(Severity::Notice, Stage::Dwell, "effort-incomplete", subject, said)
 }

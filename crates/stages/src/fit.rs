@@ -113,7 +113,7 @@ pub fn fit_places(inputs: &Inputs, heard: &mut dyn Rounds) -> Result<Fitted, Run
     let near = match measures.is_empty() {
         true => Vec::new(),
         false => {
-            let sure = observe::observations(pipeline, board, seen, &places).observations;
+            let sure = observe::build_observations(pipeline, board, seen, &places).observations;
             measures.near(&mut geometry, &sure)?
         }
     };
@@ -123,7 +123,7 @@ pub fn fit_places(inputs: &Inputs, heard: &mut dyn Rounds) -> Result<Fitted, Run
         rounds += 1;
         heard.begins(rounds);
         frames::start_frames(pipeline, &mut geometry, &places);
-        let mut observed = observe::observations(pipeline, board, seen, &places);
+        let mut observed = observe::build_observations(pipeline, board, seen, &places);
         measures.add(&mut observed, &measured)?;
         let Observed { observations, rejections } = observed.not_empty()?;
         if !heard.is_worth_fitting(&observations) {
@@ -135,7 +135,7 @@ pub fn fit_places(inputs: &Inputs, heard: &mut dyn Rounds) -> Result<Fitted, Run
         let mut fitted =
             Fitted { geometry, model, observations, session, calibration, places, rejections, rounds };
         let again = match rounds < inputs.most_rounds && heard.goes_on(&fitted) {
-            true => moved(inputs, &fitted, (&measures, &near, &measured))?,
+            true => updated_places(inputs, &fitted, (&measures, &near, &measured))?,
             false => None,
         };
         match again {
@@ -153,7 +153,7 @@ pub fn fit_places(inputs: &Inputs, heard: &mut dyn Rounds) -> Result<Fitted, Run
 type WhereAll = (Vec<Option<Association>>, Vec<bool>);
 
 /// Where the dwells are by a fit, and what closes by it; none where both stay.
-fn moved(
+fn updated_places(
     inputs: &Inputs,
     fitted: &Fitted,
     (measures, near, measured): (&Measures<'_>, &[bool], &[bool]),

@@ -1,14 +1,14 @@
 //! The nominal model of a pipeline: chain, base, tip and one board frame a recording.
 
 use crate::RunError;
-use crate::declared::{declare, override_parameters};
+use crate::declared::{declare_parameters, override_parameters};
 use crate::seen::RecordingData;
 use crate::two_arms;
 use armcal_config::{
     BoardPose, ConfigError, FrameSection, MarkerSection, MarkersOn, ModelSection, Pipeline, TableSection,
-    Vertical, measured,
+    Vertical, pose_knowledge,
 };
-use armcal_core::{Observation, Pose, Severity, Stage, Warning, listed};
+use armcal_core::{Observation, Pose, Severity, Stage, Warning, list_names};
 use armcal_model::{
     Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Marker, Model, RecordingStart, Session,
 };
@@ -32,7 +32,7 @@ pub fn nominal_chain(pipeline: &Pipeline) -> Result<(Vec<String>, Chain), RunErr
 }
 
 /// The chain alone: bases at the world's origin, tips at the last links, nothing in doubt.
-pub fn bare(chain: &Chain, markers: Vec<Marker>) -> Result<Model, RunError> {
+pub fn bare_model(chain: &Chain, markers: Vec<Marker>) -> Result<Model, RunError> {
     if chain.arms().is_empty() {
         return Ok(Model::new(chain.clone(), Frames { markers, ..Frames::of_bare_arm() })?);
     }
@@ -45,13 +45,13 @@ pub fn bare(chain: &Chain, markers: Vec<Marker>) -> Result<Model, RunError> {
 fn chain_of(model: &ModelSection, measured: &[&str], folder: &Path) -> Result<(String, Chain), RunError> {
     if let Some(dh) = &model.dh {
         let path = folder.join(dh);
-        let text = read("DH model", &path)?;
+        let text = read_file_text("DH model", &path)?;
         let chain = Chain::from_dh_toml(&text, &path)?;
         return Ok((text, chain));
     }
     let path = folder.join(model.urdf.as_deref().unwrap_or(Path::new("")));
     let link = |name: &Option<String>| name.clone().unwrap_or_default();
-    let text = read("URDF", &path)?;
+    let text = read_file_text("URDF", &path)?;
     let (base, tip) = (link(&model.base_link), link(&model.tip_link));
     let chain =
         Chain::from_urdf_branches(&text, &base, &tip, measured, &path)?.with_masses(model.masses, &path)?;
@@ -76,14 +76,14 @@ pub fn links_without_mass(pipeline: &Pipeline, chain: &Chain) -> Option<Warning>
     let said = format!("the URDF gives it no mass, {then}. Write its <inertial>");
     let warning =
         |subject| Warning::new(Severity::Notice, Stage::Calibrate, "link-without-mass", subject, said);
-    (!links.is_empty()).then(|| warning(format!("link {}", listed(&links))))
+    (!links.is_empty()).then(|| warning(format!("link {}", list_names(&links))))
 }
 
 /// Reads the board file, if the pipeline has a table.
-pub fn board(pipeline: &Pipeline) -> Result<Option<Board>, RunError> {
+pub fn read_board(pipeline: &Pipeline) -> Result<Option<Board>, RunError> {
     let Some(table) = &pipeline.table else { return Ok(None) };
     let path = pipeline.resolve(&table.board);
-    let text = read("board", &path).map_err(|e| e.where_data_come_from(pipeline))?;
+    let text = read_file_text("board", &path).map_err(|e| e.where_data_come_from(pipeline))?;
     Ok(Some(Board::from_toml(&text, &path)?))
 }
 
@@ -96,7 +96,7 @@ pub fn nominal_model(
 ) -> Result<Model, RunError> {
     let (places, lengths) = (pipeline.places(), pipeline.lengths());
     if let Some(two) = &pipeline.two_arms {
-        let mut model = two_arms::nominal(two, chain)?.against(&places, &lengths)?;
+        let mut model = two_arms::nominal_pair(two, chain)?.against(&places, &lengths)?;
         override_parameters(&mut model, &pipeline.parameters)?;
         return Ok(model);
     }
@@ -116,7 +116,7 @@ pub fn nominal_model(
         boards,
     };
     let mut model = Model::new(chain.clone(), frames)?.against(&places, &lengths)?;
-    declare(&mut model, pipeline)?;
+    declare_parameters(&mut model, pipeline)?;
     let own = &pipeline.pool.per_recording;
     if seen.len() > 1 && !own.is_empty() {
         let base = |s: &RecordingData| s.base.as_ref().map(|base| base.pose);
@@ -155,7 +155,7 @@ pub fn effect_specs(pipeline: &Pipeline, model: &Model) -> Result<Vec<EffectSpec
 }
 
 /// Effects of the pipeline that stand for one of several names: how it is spelt, and all of them.
-pub fn ties(pipeline: &Pipeline, model: &Model) -> Vec<(String, Vec<String>)> {
+pub fn effect_ties(pipeline: &Pipeline, model: &Model) -> Vec<(String, Vec<String>)> {
     let joints = model.chain().joint_names();
     let tied = pipeline.effects.iter().filter(|table| table.one_of.len() > 1);
     tied.filter_map(|table| Some((table.spec(joints).ok()?.to_string(), table.one_of.clone()))).collect()
@@ -173,7 +173,7 @@ pub fn start_frames(pipeline: &Pipeline, model: &mut Model, places: &[Option<Ass
     }
 }
 
-fn read(what: &'static str, path: &Path) -> Result<String, RunError> {
+fn read_file_text(what: &'static str, path: &Path) -> Result<String, RunError> {
     let read = input::read_to_string(path, input::Kind::Text);
     Ok(read.map_err(|source| ConfigError::ReadFile { what, path: path.to_owned(), source })?)
 }
@@ -209,11 +209,11 @@ fn board_frame(
                 MarkersOn::Board => subject * at,
                 MarkersOn::Frame => subject * at * tilted,
             };
-            (board, measured(table.sigma_mm, table.sigma_deg))
+            (board, pose_knowledge(table.sigma_mm, table.sigma_deg))
         }
         (BoardPose::Estimated, _) => (at * tilted, Knowledge::Estimated),
         (BoardPose::Given | BoardPose::Measured, _) => {
-            (at * tilted, measured(table.sigma_mm, table.sigma_deg))
+            (at * tilted, pose_knowledge(table.sigma_mm, table.sigma_deg))
         }
     };
     Ok(Frame { name: format!("board.{}", seen.name), pose, knowledge, free_rotation: true })

@@ -14,7 +14,7 @@ const LEAST_MOTION_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 const LEAST_SPREAD: f64 = 0.03;
 
 /// What is at one of the points: an arm, or a branch.
-fn name(model: &Model, joins: [FeatureId; 2], end: usize) -> String {
+fn end_name(model: &Model, joins: [FeatureId; 2], end: usize) -> String {
     let arm = model.chain().arms().get(end).map(|arm| format!("the {} arm", arm.name));
     arm.unwrap_or_else(|| format!("what carries {}", model.feature_name(joins[end])))
 }
@@ -35,7 +35,7 @@ pub fn both_move(model: &Model, joins: [FeatureId; 2], dwells: &[Observation]) -
         let problem = format!(
             "{} never moves: over {} dwells none of its joints changes by more than {:.3} deg; lead both through many poses, or \
              check its topic and joint names",
-            name(model, joins, end),
+            end_name(model, joins, end),
             dwells.len(),
             widest_rad.to_degrees()
         );
@@ -45,7 +45,7 @@ pub fn both_move(model: &Model, joins: [FeatureId; 2], dwells: &[Observation]) -
 }
 
 /// Refuses tips that hardly move: readings in another unit close as well as any.
-pub fn spread(model: &Model, joins: [FeatureId; 2], joined: &[Observation]) -> Result<(), RunError> {
+pub fn check_spread(model: &Model, joins: [FeatureId; 2], joined: &[Observation]) -> Result<(), RunError> {
     let p = model.nominal();
     for end in 0..2 {
         let tip_m = |o: &Observation| model.feature_in_base(&p, joins[end], &o.joint_rad).translation.vector;
@@ -57,7 +57,7 @@ pub fn spread(model: &Model, joins: [FeatureId; 2], joined: &[Observation]) -> R
             let problem = format!(
                 "the tip of {} is within {:.1} mm of one point in all joined dwells, {:.0} mm from its base: lead both through \
                  poses that differ more, or check the unit of its readings",
-                name(model, joins, end),
+                end_name(model, joins, end),
                 square.sqrt() * 1e3,
                 reach_m * 1e3
             );
@@ -69,7 +69,7 @@ pub fn spread(model: &Model, joins: [FeatureId; 2], joined: &[Observation]) -> R
 
 /// Three points place a base, six distances do; twice as many also show which dwells do not belong. A pose held twice
 /// counts once. `dwells` is how many there are in all; `base` says whether each arm has its own.
-pub fn enough(
+pub fn check_pose_count(
     closure: &ClosedChainSection,
     joined: &[Observation],
     (dwells, bases): (usize, bool),

@@ -28,7 +28,7 @@ pub mod still;
 mod two_arms;
 mod unaligned;
 
-pub use declared::{Change, change_nominals, declare, override_parameters};
+pub use declared::{Change, change_nominals, declare_parameters, override_parameters};
 pub use error::RunError;
 pub use fit::{Fitted, Inputs, Rounds, fit_places, with_effects};
 pub use placed::{Placed, PlacedBase};

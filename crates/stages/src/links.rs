@@ -28,11 +28,11 @@ pub struct Placed {
 }
 
 /// Places a body that was seen at `seen_m` on the link that was at `link` then.
-pub fn place(link: &[Pose], seen_m: &[Vector3<f64>]) -> Option<Placed> {
+pub fn place_on_link(link: &[Pose], seen_m: &[Vector3<f64>]) -> Option<Placed> {
     if link.len() < FEWEST {
         return None;
     }
-    let first = fitted(link, seen_m)?;
+    let first = fit_on_link(link, seen_m)?;
     let near = |i: &usize| first.off(&link[*i], &seen_m[*i]) <= FAR * first.off_m;
     let near: Vec<usize> = (0..link.len()).filter(near).collect();
     if near.len() < FEWEST || near.len() == link.len() {
@@ -40,7 +40,7 @@ pub fn place(link: &[Pose], seen_m: &[Vector3<f64>]) -> Option<Placed> {
     }
     let (some_link, some_m): (Vec<Pose>, Vec<Vector3<f64>>) =
         near.iter().map(|i| (link[*i], seen_m[*i])).unzip();
-    fitted(&some_link, &some_m).map(|again| again.judged(link, seen_m))
+    fit_on_link(&some_link, &some_m).map(|again| again.judged(link, seen_m))
 }
 
 impl Placed {
@@ -54,12 +54,12 @@ impl Placed {
     }
 }
 
-fn fitted(link: &[Pose], seen_m: &[Vector3<f64>]) -> Option<Placed> {
+fn fit_on_link(link: &[Pose], seen_m: &[Vector3<f64>]) -> Option<Placed> {
     let mut placed = Placed { base: Pose::identity(), at_m: Vector3::zeros(), off_m: 0.0 };
     for _ in 0..TURNS {
         let points: Vec<Vector3<f64>> =
             link.iter().map(|l| l.transform_point(&placed.at_m.into()).coords).collect();
-        placed.base = rigid(&points, seen_m)?;
+        placed.base = fit_rigid_motion(&points, seen_m)?;
         let turned = placed.base.rotation;
         // One shift of all that is seen goes with the place: both are fitted, and the next turn moves the base.
         let rows = 3 * link.len();
@@ -83,7 +83,7 @@ fn fitted(link: &[Pose], seen_m: &[Vector3<f64>]) -> Option<Placed> {
 }
 
 /// The rigid motion that carries points onto others.
-pub fn rigid(from_m: &[Vector3<f64>], to_m: &[Vector3<f64>]) -> Option<Pose> {
+pub fn fit_rigid_motion(from_m: &[Vector3<f64>], to_m: &[Vector3<f64>]) -> Option<Pose> {
     let count = from_m.len().max(1) as f64;
     let mean = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / count;
     let (from, to) = (mean(from_m), mean(to_m));
@@ -120,13 +120,13 @@ mod tests {
             own.iter().map(|l| base * (l * nalgebra::Point3::from(at_m))).map(|p| p.coords).collect();
         // One pose was seen wrong: it must not spoil the rest.
         seen[7] += Vector3::new(0.0, 0.3, 0.0);
-        let placed = place(&own, &seen).unwrap();
+        let placed = place_on_link(&own, &seen).unwrap();
         assert!((placed.at_m - at_m).norm() < 1e-4 && placed.off_m < 1e-4, "{placed:?}");
         assert!((placed.base.translation.vector - base.translation.vector).norm() < 1e-3, "{placed:?}");
         assert!(placed.base.rotation.angle_to(&base.rotation) < 1e-3);
         let other: Vec<Pose> = (0..40).map(|i| link(1.3 * f64::from(i), 0.6)).collect();
-        assert!(place(&other, &seen).unwrap().off_m > 0.05);
-        assert!(place(&own[..5], &seen[..5]).is_none());
+        assert!(place_on_link(&other, &seen).unwrap().off_m > 0.05);
+        assert!(place_on_link(&own[..5], &seen[..5]).is_none());
         let turns: Vec<UnitQuaternion<f64>> =
             own.iter().map(|l| base.rotation * l.rotation * base.rotation).collect();
         assert!(turned_apart(&own, &turns) < 1e-9 && turned_apart(&other, &turns) > 0.1);

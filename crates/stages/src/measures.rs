@@ -5,7 +5,7 @@
 
 use crate::RunError;
 use crate::joined_tips;
-use crate::observe::{Observed, observation};
+use crate::observe::{Observed, dwell_observation};
 use crate::placed::Placed;
 use crate::seen::RecordingData;
 use armcal_calibrate::{Calibration, align_frames, expected_norm_m, fit_frames, position_covariance_m2};
@@ -49,9 +49,9 @@ impl<'a> Measures<'a> {
         for (recording, seen) in seen.iter().enumerate() {
             for dwell in &seen.dwells {
                 for (measure, m) in measures.iter().enumerate().filter(|(_, m)| m.is_in(recording)) {
-                    let Some((reference, sigma_m)) = reference(m, dwell) else { continue };
+                    let Some((reference, sigma_m)) = dwell_reference(m, dwell) else { continue };
                     let covariance_m2 = Matrix3::identity() * sigma_m.powi(2);
-                    let of_tip = observation(dwell, seen, reference, covariance_m2);
+                    let of_tip = dwell_observation(dwell, seen, reference, covariance_m2);
                     let observation = Observation { feature: m.feature, ..of_tip };
                     all.push(Candidate { measure, observation });
                 }
@@ -93,7 +93,7 @@ impl<'a> Measures<'a> {
         }
         self.enough(geometry, &near, sure)?;
         self.check_joined(geometry, &near, joined_tips::both_move)?;
-        self.check_joined(geometry, &near, joined_tips::spread)?;
+        self.check_joined(geometry, &near, joined_tips::check_spread)?;
         Ok(near)
     }
 
@@ -252,7 +252,7 @@ impl<'a> Measures<'a> {
         };
         let dwells = self.all.iter().filter(|c| c.measure == at).count();
         let joined = self.chosen(which, |measure| measure == at);
-        joined_tips::enough(closure, &joined, (dwells, self.pipeline.two_arms.is_some()))
+        joined_tips::check_pose_count(closure, &joined, (dwells, self.pipeline.two_arms.is_some()))
     }
 
     /// What the frames are placed by, if every measurement was made.
@@ -279,7 +279,7 @@ impl<'a> Measures<'a> {
 }
 
 /// What a dwell is as a measurement, and its standard error [m]; none where its instrument reads nothing.
-fn reference(measure: &Measure, dwell: &Dwell) -> Option<(Reference, f64)> {
+fn dwell_reference(measure: &Measure, dwell: &Dwell) -> Option<(Reference, f64)> {
     let (reading_m, own_m) = match measure.reading_m {
         None => (0.0, 0.0),
         Some([low_m, high_m]) => {

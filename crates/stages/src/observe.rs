@@ -63,7 +63,7 @@ pub fn same_places(a: &[Option<Association>], b: &[Option<Association>]) -> bool
 }
 
 /// Turns every dwell into an observation or a rejection.
-pub fn observations(
+pub fn build_observations(
     pipeline: &Pipeline,
     board: Option<&Board>,
     seen: &[RecordingData],
@@ -74,9 +74,11 @@ pub fn observations(
         for (i, dwell) in seen.dwells.iter().enumerate() {
             let place = association.as_ref().and_then(|a| a.assignments.get(i)).map(|a| &a.place);
             let outcome = match (place.and_then(seated_in), board) {
-                (Some(cavity), Some(board)) if pipeline.observations.seated => seated(board, cavity),
+                (Some(cavity), Some(board)) if pipeline.observations.seated => {
+                    seated_reference(board, cavity)
+                }
                 (Some(_), _) => Err("seated dwells are switched off in [observations]".into()),
-                (None, _) => tracked(pipeline, dwell).map_err(|why| why_not(place, why)),
+                (None, _) => tracked_reference(pipeline, dwell).map_err(|why| why_not(place, why)),
             };
             let markers = markers_of(pipeline, dwell);
             let seen_of_it = !markers.is_empty();
@@ -123,11 +125,11 @@ fn of_feature(
     feature: FeatureId,
     (reference, covariance_m2): Referenced,
 ) -> Observation {
-    Observation { feature, ..observation(dwell, seen, reference, covariance_m2) }
+    Observation { feature, ..dwell_observation(dwell, seen, reference, covariance_m2) }
 }
 
 /// What the sensor saw of the moving tip, as an observation; `index` numbers it within its recording.
-pub fn moving(
+pub fn moving_observation(
     pipeline: &Pipeline,
     recording: usize,
     index: usize,
@@ -180,14 +182,14 @@ fn seated_in(place: &Place) -> Option<&str> {
 type Referenced = (Reference, Matrix3<f64>);
 
 /// The tip is where the cavity is, as well as cavity and seat are made.
-fn seated(board: &Board, cavity: &str) -> Result<Referenced, String> {
+fn seated_reference(board: &Board, cavity: &str) -> Result<Referenced, String> {
     let found = board.cavity(cavity).ok_or_else(|| format!("cavity `{cavity}` is not on the board"))?;
     let reference = Reference::Seated { cavity: cavity.to_owned(), in_board_m: found.in_board_m };
     Ok((reference, board.seat_covariance_m2()))
 }
 
 /// The tip is where the sensor saw it.
-fn tracked(pipeline: &Pipeline, dwell: &Dwell) -> Result<Referenced, String> {
+fn tracked_reference(pipeline: &Pipeline, dwell: &Dwell) -> Result<Referenced, String> {
     let Some(tip) = dwell.tip.as_ref() else {
         let what = if pipeline.markers.is_empty() { "the tip" } else { "the tip or a marker" };
         return Err(format!("the sensor did not see {what} during it"));
@@ -238,7 +240,7 @@ fn why_not(place: Option<&Place>, untracked: String) -> String {
 }
 
 /// A dwell of a recording as an observation of this reference.
-pub fn observation(
+pub fn dwell_observation(
     dwell: &Dwell,
     seen: &RecordingData,
     reference: Reference,

@@ -52,7 +52,7 @@ pub fn dwells_of_all(
     progress: &dyn Steps,
     keep: &mut dyn FnMut(Samples),
 ) -> Result<Vec<RecordingData>, RunError> {
-    let speed_model = frames::bare(chain, frames::markers(pipeline))?;
+    let speed_model = frames::bare_model(chain, frames::markers(pipeline))?;
     let entries = pipeline.recordings.iter().zip(recordings).enumerate();
     let mut all = entries
         .map(|(index, (entry, recording))| {
@@ -67,7 +67,7 @@ pub fn dwells_of_all(
 }
 
 /// Every two recordings that hold the same readings, in the order of the pipeline.
-pub fn repeats(fingerprints: &[&Fingerprint]) -> Vec<Repeat> {
+pub fn find_repeats(fingerprints: &[&Fingerprint]) -> Vec<Repeat> {
     let before = |second: usize| (0..second).map(move |first| (first, second));
     let pairs = (0..fingerprints.len()).flat_map(before);
     let repeat = |(first, second): (usize, usize)| {
@@ -83,7 +83,7 @@ pub fn repeats(fingerprints: &[&Fingerprint]) -> Vec<Repeat> {
 /// Two recordings with the same readings, by their names.
 pub fn refuse_repeated(recordings: &[(&str, &Fingerprint)]) -> Result<(), RunError> {
     let fingerprints: Vec<&Fingerprint> = recordings.iter().map(|(_, fingerprint)| *fingerprint).collect();
-    match repeats(&fingerprints).first() {
+    match find_repeats(&fingerprints).first() {
         None => Ok(()),
         Some(repeat) => Err(RunError::RecordedTwice {
             first: recordings[repeat.first].0.to_owned(),
@@ -118,11 +118,11 @@ fn dwells_of_one(
         in_order_of(speed_model.chain(), &mut samples.joints, name)?;
     }
     // Readings that are held leap too: told once, by their cause.
-    match readings::stale(&samples.joints, name) {
+    match readings::stale_warning(&samples.joints, name) {
         Some(stale) => warnings.push(stale),
-        None => warnings.extend(readings::leaps(&samples.joints, name)),
+        None => warnings.extend(readings::leap_warnings(&samples.joints, name)),
     }
-    let clock = match leading(&samples, speed_model) {
+    let clock = match alignment_feature(&samples, speed_model) {
         Some((feature, tip)) => {
             let doubts = Doubts::of(pipeline, speed_model, feature);
             let aligned = align_clocks(&samples.joints, tip, &doubts, &pipeline.clock);
@@ -132,7 +132,7 @@ fn dwells_of_one(
                     let aligned = align_clocks(&reading.joints, &reading.tip, &arm, &pipeline.clock);
                     aligned.ok().map(|(clock, _)| clock.correlation)
                 };
-                misread(in_dwell(source), name, &samples, &with)
+                alignment_error(in_dwell(source), name, &samples, &with)
             })?;
             warnings.extend(said);
             Some(clock)
@@ -144,9 +144,9 @@ fn dwells_of_one(
     warnings.extend(said);
     if let Some(points) = &entry.points {
         let path = pipeline.resolve(&points.csv);
-        warnings.push(points::add(points, (&path, name), speed_model, &mut dwells)?);
+        warnings.push(points::assign_to_dwells(points, (&path, name), speed_model, &mut dwells)?);
     }
-    warnings.extend(rigid::reject(speed_model, &mut dwells));
+    warnings.extend(rigid::reject_outliers(speed_model, &mut dwells));
     let (base, table) = static_bodies(pipeline, &samples, name, &mut warnings)?;
     let bodies = [("base", base.is_some(), &samples.base), ("table", table.is_some(), &samples.table)];
     let travels_m = bodies
@@ -198,7 +198,7 @@ fn in_order_of(chain: &Chain, joints: &mut JointSamples, recording: &str) -> Res
 }
 
 /// What the clocks are aligned by: the tip, or the first marker where nothing saw the tip.
-fn leading<'s>(samples: &'s Samples, model: &Model) -> Option<(FeatureId, &'s PoseSamples)> {
+fn alignment_feature<'s>(samples: &'s Samples, model: &Model) -> Option<(FeatureId, &'s PoseSamples)> {
     let seen = model.features().filter_map(|(feature, name)| match feature.is_tip() {
         true => Some((feature, samples.tip.as_ref()?)),
         false => Some((feature, samples.bodies.get(name)?)),
@@ -207,7 +207,7 @@ fn leading<'s>(samples: &'s Samples, model: &Model) -> Option<(FeatureId, &'s Po
 }
 
 /// The error of clocks that cannot be aligned, with the reading that would align them.
-fn misread(
+fn alignment_error(
     source: RunError,
     name: &str,
     samples: &Samples,

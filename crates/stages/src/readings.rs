@@ -46,15 +46,15 @@ impl Readings {
             median(&sizes) < RESTING && sizes.iter().copied().fold(0.0, f64::max) > MOVING
         };
         Readings {
-            exact_rad: dwells.iter().filter_map(|d| exact(joints, d)).collect(),
+            exact_rad: dwells.iter().filter_map(|d| constant_reading_rad(joints, d)).collect(),
             mostly_zero: !joints.is_empty() && joints.joint_rad.iter().all(at_rest),
-            stamps: stamps(&joints.time_ns, repeated),
+            stamps: stamp_problem(&joints.time_ns, repeated),
         }
     }
 }
 
 /// Stamps that repeat, or come in bursts: rounded, or of another unit than nanoseconds.
-fn stamps(time_ns: &[i64], repeated: u64) -> Option<String> {
+fn stamp_problem(time_ns: &[i64], repeated: u64) -> Option<String> {
     let rows = time_ns.len();
     if repeated > rows as u64 {
         return Some(format!(
@@ -75,7 +75,7 @@ fn stamps(time_ns: &[i64], repeated: u64) -> Option<String> {
 }
 
 /// The one value that each joint reads in most of a dwell, to the last bit.
-fn exact(joints: &JointSamples, dwell: &Dwell) -> Option<Vec<f64>> {
+fn constant_reading_rad(joints: &JointSamples, dwell: &Dwell) -> Option<Vec<f64>> {
     let from = joints.time_ns.partition_point(|t| *t < dwell.start_ns);
     let to = joints.time_ns.partition_point(|t| *t <= dwell.end_ns);
     if to < from + MANY {
@@ -90,7 +90,7 @@ fn exact(joints: &JointSamples, dwell: &Dwell) -> Option<Vec<f64>> {
 }
 
 /// Joints that leap from one reading to the next. A joint that only turns fast comes to its speed, and leaves it, in steps.
-pub fn leaps(joints: &JointSamples, recording: &str) -> Vec<Warning> {
+pub fn leap_warnings(joints: &JointSamples, recording: &str) -> Vec<Warning> {
     let near: Vec<bool> = joints.time_ns.windows(2).map(|w| w[1] - w[0] <= NEXT_NS).collect();
     let leap = |column: &Vec<f64>| -> Vec<f64> {
         let steps: Vec<f64> = column.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
@@ -120,7 +120,7 @@ pub fn leaps(joints: &JointSamples, recording: &str) -> Vec<Warning> {
 }
 
 /// Readings that are repeated while the arm moves: all joints stand still, and step to where they have come meanwhile.
-pub fn stale(joints: &JointSamples, recording: &str) -> Option<Warning> {
+pub fn stale_warning(joints: &JointSamples, recording: &str) -> Option<Warning> {
     let n = joints.time_ns.len();
     let step = |i: usize| {
         joints.joint_rad.iter().map(|column| (column[i] - column[i - 1]).abs()).fold(0.0, f64::max)
@@ -172,7 +172,7 @@ mod tests {
     fn leaps_are_told_by_joint_and_size() {
         let smooth: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
         let wraps = smooth.iter().map(|q| q.rem_euclid(0.4)).collect();
-        let found = leaps(&stream(vec![smooth, wraps]), "a");
+        let found = leap_warnings(&stream(vec![smooth, wraps]), "a");
         assert_eq!(found.len(), 1);
         assert!(
             found[0].message.starts_with("joint 2 (j1) leaps 2 times")
@@ -180,7 +180,7 @@ mod tests {
         );
         // A spike is two leaps, there and back.
         let spike = (0..100).map(|i| if i == 50 { 1.0 } else { 0.0 }).collect();
-        assert!(leaps(&stream(vec![spike]), "a")[0].message.contains("leaps 2 times"));
+        assert!(leap_warnings(&stream(vec![spike]), "a")[0].message.contains("leaps 2 times"));
     }
 
     #[test]
@@ -189,34 +189,36 @@ mod tests {
         let turn =
             |i: i32| 0.5 * std::f64::consts::PI * (1.0 - (f64::from(i) * 0.1 * std::f64::consts::PI).cos());
         let fast = (0..60).map(|i: i32| turn((i - 20).clamp(0, 10))).collect();
-        assert!(leaps(&stream(vec![fast]), "a").is_empty());
+        assert!(leap_warnings(&stream(vec![fast]), "a").is_empty());
     }
 
     #[test]
     fn readings_that_are_held_and_leap_are_stale_and_a_rest_before_a_move_is_not() {
         let moving: Vec<f64> = (0..3000).map(|i| (0.02 * f64::from(i)).sin()).collect();
         let held: Vec<f64> = (0..3000).map(|i| moving[i / 100 * 100]).collect();
-        let found = stale(&stream(vec![held]), "a").expect("it is stale");
+        let found = stale_warning(&stream(vec![held]), "a").expect("it is stale");
         assert_eq!(found.code, "stale-readings");
-        assert!(stale(&stream(vec![moving]), "a").is_none());
+        assert!(stale_warning(&stream(vec![moving]), "a").is_none());
         // Rests of 1 s between moves of 1 s, a step of 0.03 rad from reading to reading.
         let rests = (0..3000).map(|i: i32| 0.03 * f64::from(i / 200 * 100 + (i % 200).min(100))).collect();
-        assert!(stale(&stream(vec![rests]), "a").is_none());
+        assert!(stale_warning(&stream(vec![rests]), "a").is_none());
     }
 
     #[test]
     fn stamps_that_repeat_or_come_in_bursts_are_told() {
         let even: Vec<i64> = (0..1000).map(|i| i * 10_000_000).collect();
-        assert_eq!(stamps(&even, 1000), None);
-        assert!(stamps(&even, 1001).is_some_and(|why| why.contains("1001 of 2001 joint messages repeat")));
+        assert_eq!(stamp_problem(&even, 1000), None);
+        assert!(
+            stamp_problem(&even, 1001).is_some_and(|why| why.contains("1001 of 2001 joint messages repeat"))
+        );
         // Microseconds where nanoseconds belong: a hundred messages in a thousandth of a second, every second.
         let microseconds: Vec<i64> =
             even.iter().map(|t| t / 1_000_000_000 * 1_000_000_000 + t % 1_000_000_000 / 1000).collect();
-        assert!(stamps(&microseconds, 0).is_some_and(|why| why.contains("0.010 ms apart where 9 ms")));
+        assert!(stamp_problem(&microseconds, 0).is_some_and(|why| why.contains("0.010 ms apart where 9 ms")));
         // A recorder that is switched on for a second at each pose, a minute apart.
         let paused: Vec<i64> =
             even.iter().map(|t| t / 1_000_000_000 * 60_000_000_000 + t % 1_000_000_000).collect();
-        assert_eq!(stamps(&paused, 0), None);
+        assert_eq!(stamp_problem(&paused, 0), None);
     }
 
     #[test]

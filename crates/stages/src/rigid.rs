@@ -28,23 +28,28 @@ struct Wrong {
 }
 
 /// Takes single markers that are not where their link has them out of the dwells of one recording, and says so.
-pub fn reject(model: &Model, dwells: &mut [Dwell]) -> Vec<Warning> {
+pub fn reject_outliers(model: &Model, dwells: &mut [Dwell]) -> Vec<Warning> {
     let wrong = wrong_distances(model, dwells);
     let mut accused: BTreeMap<FeatureId, Vec<usize>> = BTreeMap::new();
     let mut unsure: BTreeMap<[FeatureId; 2], Vec<(usize, f64)>> = BTreeMap::new();
     for (at, dwell) in dwells.iter().enumerate() {
         let own: Vec<&Wrong> = wrong.iter().filter(|w| w.dwell == at).collect();
-        match alone(model, dwell, &own) {
+        match sole_outlier(model, dwell, &own) {
             Some(feature) => accused.entry(feature).or_default().push(at),
             None => own.iter().for_each(|w| unsure.entry(w.pair).or_default().push((at, w.off_m))),
         }
     }
     accused.retain(|feature, own| {
-        accidents(own, dwells.iter().filter(|d| seen(model, d, *feature).is_some()).count())
+        is_accidental(
+            own,
+            dwells.iter().filter(|d| feature_measurement(model, d, *feature).is_some()).count(),
+        )
     });
-    unsure.retain(|_, own| accidents(&own.iter().map(|(at, _)| *at).collect::<Vec<_>>(), dwells.len()));
-    let mut warnings: Vec<Warning> =
-        accused.iter().map(|(feature, own)| rejected(model.feature_name(*feature), own, dwells)).collect();
+    unsure.retain(|_, own| is_accidental(&own.iter().map(|(at, _)| *at).collect::<Vec<_>>(), dwells.len()));
+    let mut warnings: Vec<Warning> = accused
+        .iter()
+        .map(|(feature, own)| rejection_warning(model.feature_name(*feature), own, dwells))
+        .collect();
     for (feature, own) in &accused {
         for at in own {
             match feature.is_tip() {
@@ -60,7 +65,11 @@ pub fn reject(model: &Model, dwells: &mut [Dwell]) -> Vec<Warning> {
 }
 
 /// What the sensor saw of a feature during a dwell.
-fn seen<'d>(model: &Model, dwell: &'d Dwell, feature: FeatureId) -> Option<&'d TipMeasurement> {
+fn feature_measurement<'d>(
+    model: &Model,
+    dwell: &'d Dwell,
+    feature: FeatureId,
+) -> Option<&'d TipMeasurement> {
     if feature.is_tip() { dwell.tip.as_ref() } else { dwell.markers.get(model.feature_name(feature)) }
 }
 
@@ -71,7 +80,7 @@ fn wrong_distances(model: &Model, dwells: &[Dwell]) -> Vec<Wrong> {
     for (k, &a) in features.iter().enumerate() {
         for &b in features[k + 1..].iter().filter(|b| model.on_one_link(a, **b)) {
             let distance = |(dwell, d): (usize, &Dwell)| {
-                let (a, b) = (seen(model, d, a)?, seen(model, d, b)?);
+                let (a, b) = (feature_measurement(model, d, a)?, feature_measurement(model, d, b)?);
                 let between = a.position_m - b.position_m;
                 let along = between.try_normalize(0.0)?;
                 let variance_m2 = along.dot(&((a.covariance_m2 + b.covariance_m2) * along));
@@ -95,7 +104,7 @@ fn wrong_distances(model: &Model, dwells: &[Dwell]) -> Vec<Wrong> {
 }
 
 /// The one feature of a dwell that is off from all others of its link, of which there are at least two.
-fn alone(model: &Model, dwell: &Dwell, wrong: &[&Wrong]) -> Option<FeatureId> {
+fn sole_outlier(model: &Model, dwell: &Dwell, wrong: &[&Wrong]) -> Option<FeatureId> {
     let has = |id: FeatureId| wrong.iter().filter(|w| w.pair.contains(&id)).count();
     let others = |id: FeatureId| {
         let beside = |other: &FeatureId| *other != id && model.on_one_link(id, *other);
@@ -103,7 +112,7 @@ fn alone(model: &Model, dwell: &Dwell, wrong: &[&Wrong]) -> Option<FeatureId> {
             .features()
             .map(|(other, _)| other)
             .filter(beside)
-            .filter(|o| seen(model, dwell, *o).is_some())
+            .filter(|o| feature_measurement(model, dwell, *o).is_some())
             .count()
     };
     let is_alone = |id: &FeatureId| others(*id) >= 2 && has(*id) == others(*id) && has(*id) == wrong.len();
@@ -111,16 +120,16 @@ fn alone(model: &Model, dwell: &Dwell, wrong: &[&Wrong]) -> Option<FeatureId> {
 }
 
 /// Whether these are few of so many dwells, and not in a row.
-fn accidents(own: &[usize], of: usize) -> bool {
+fn is_accidental(own: &[usize], of: usize) -> bool {
     let few = own.len() as f64 <= (MOST * of as f64).max(1.0);
     few && !own.windows(RUN).any(|run| run[RUN - 1] - run[0] == RUN - 1)
 }
 
-fn rejected(name: &str, own: &[usize], dwells: &[Dwell]) -> Warning {
+fn rejection_warning(name: &str, own: &[usize], dwells: &[Dwell]) -> Warning {
     let message = format!(
         "rejected in {}: there its distances to the other markers of its link are not what they are elsewhere, as after a swap or a \
          knock; what else was seen then is used",
-        listed(own.iter().map(|at| dwells[*at].id.dwell))
+        dwell_list(own.iter().map(|at| dwells[*at].id.dwell))
     );
     Warning::new(Severity::Notice, Stage::Dwell, "marker-rejected", format!("marker {name}"), message)
 }
@@ -131,12 +140,12 @@ fn told_apart([a, b]: [&str; 2], own: &[(usize, f64)], dwells: &[Dwell]) -> Warn
         "their distance is off by up to {:.2} mm in {}: one of them was swapped or knocked, and nothing on their link tells which; a \
          third marker there would",
         most_m * 1e3,
-        listed(own.iter().map(|(at, _)| dwells[*at].id.dwell))
+        dwell_list(own.iter().map(|(at, _)| dwells[*at].id.dwell))
     );
     Warning::new(Severity::Notice, Stage::Dwell, "marker-distance", format!("markers {a} and {b}"), message)
 }
 
-fn listed(dwells: impl Iterator<Item = usize>) -> String {
+fn dwell_list(dwells: impl Iterator<Item = usize>) -> String {
     let all: Vec<String> = dwells.map(|d| d.to_string()).collect();
     let more = if all.len() > 8 { ", ..." } else { "" };
     format!("dwell {}{more}", all[..all.len().min(8)].join(", "))
@@ -214,11 +223,11 @@ mod tests {
     #[test]
     fn of_three_on_a_link_the_one_that_is_off_is_rejected_alone() {
         let (names, mut all) = (["a", "b"], dwells(&["a", "b"]));
-        assert!(reject(&arm(&names), &mut all).is_empty(), "nothing is wrong");
+        assert!(reject_outliers(&arm(&names), &mut all).is_empty(), "nothing is wrong");
         knock(&mut all, "b", 7..8);
         knock(&mut all, "a", 19..20);
         let before = all.clone();
-        let said = reject(&arm(&names), &mut all);
+        let said = reject_outliers(&arm(&names), &mut all);
         let told: Vec<(&str, &str)> = said.iter().map(|w| (&*w.code, w.subject.as_str())).collect();
         assert_eq!(told, [("marker-rejected", "marker a"), ("marker-rejected", "marker b")]);
         assert!(said[1].message.starts_with("rejected in dwell 7:"), "{}", said[1].message);
@@ -234,7 +243,7 @@ mod tests {
         let (names, mut all) = (["a"], dwells(&["a"]));
         knock(&mut all, "a", 7..8);
         let before = all.clone();
-        let said = reject(&arm(&names), &mut all);
+        let said = reject_outliers(&arm(&names), &mut all);
         assert_eq!((said.len(), &*said[0].code), (1, "marker-distance"));
         assert!(
             said[0].subject == "markers tip and a" && said[0].message.contains("in dwell 7:"),
@@ -249,7 +258,7 @@ mod tests {
             let (names, mut all) = (["a", "b"], dwells(&["a", "b"]));
             knock(&mut all, "b", from..30);
             let before = all.clone();
-            assert!(reject(&arm(&names), &mut all).is_empty(), "from dwell {from}");
+            assert!(reject_outliers(&arm(&names), &mut all).is_empty(), "from dwell {from}");
             assert_eq!(all, before);
         }
     }

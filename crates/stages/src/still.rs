@@ -18,7 +18,7 @@ pub fn still_tip(tip_m: f64, turned_rad: f64) -> Option<String> {
 }
 
 /// Between the lowest and the highest of some values.
-pub fn spread(values: impl Iterator<Item = f64>) -> f64 {
+pub fn value_range(values: impl Iterator<Item = f64>) -> f64 {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     high - low
 }

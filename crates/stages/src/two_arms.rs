@@ -6,7 +6,7 @@ use armcal_config::{ArmSection, ParameterOverride, Pipeline, TwoArms};
 use armcal_model::{Chain, EffectSpec, Model};
 
 /// Both nominal arms in one world, their chains read already.
-pub fn nominal(two: &TwoArms, chain: &Chain) -> Result<Model, RunError> {
+pub fn nominal_pair(two: &TwoArms, chain: &Chain) -> Result<Model, RunError> {
     let frames = |arm: &ArmSection| armcal_model::ArmFrames {
         base: arm.base.frame(&format!("{}.base", arm.name), true),
         tip: arm.tip.frame(&format!("{}.tip", arm.name), false),

@@ -1,7 +1,7 @@
 //! Clocks that cannot be aligned because something is read wrongly: the tip's speed is then another one than the arm's.
 
 use crate::readings::LEAP_RAD;
-use crate::still::{spread, still_tip};
+use crate::still::{still_tip, value_range};
 use armcal_core::units::DEGREES;
 use armcal_core::{JointSamples, PoseSamples, Samples};
 
@@ -33,14 +33,14 @@ pub fn what_would_align(
     correlation: &(dyn Fn(&Reading) -> Option<f64> + Sync),
 ) -> Option<String> {
     // What is lost between the readings, no change brings back: whatever fits then fits by chance.
-    if let Some(few) = few(samples) {
+    if let Some(few) = low_rate_note(samples) {
         return Some(few);
     }
     let tip = samples.tip.clone()?;
     let now = Reading { joints: samples.joints.clone(), tip, lengths: 1.0 };
     let mut tried: Vec<(f64, String)> = Vec::new();
     // With a body that stands still no reading of the joints aligns but by chance: it is another one, or read in another unit.
-    let still = still(samples);
+    let still = still_body_note(samples);
     let mut all = if still.is_none() { of_joints(&now) } else { Vec::new() };
     all.extend(of_bodies(&now, samples));
     for (changed, words) in all {
@@ -99,7 +99,7 @@ fn of_joints(now: &Reading) -> Vec<(Reading, String)> {
         with_joints(&|s| s.joint_rad.iter_mut().flatten().for_each(|q| *q *= factor), words);
     }
     let words = "[wrong-field] with the joints' readings taken for speeds and summed over time";
-    with_joints(&summed, words.to_owned());
+    with_joints(&integrate_speeds, words.to_owned());
     all
 }
 
@@ -146,7 +146,7 @@ fn without_leaps(reading_rad: &mut [f64]) {
 }
 
 /// Readings as speeds, summed by the trapezoidal rule from zero.
-fn summed(joints: &mut JointSamples) {
+fn integrate_speeds(joints: &mut JointSamples) {
     let seconds: Vec<f64> = joints.time_ns.windows(2).map(|w| (w[1] - w[0]) as f64 * 1e-9).collect();
     for column in &mut joints.joint_rad {
         let mut angle = 0.0;
@@ -161,17 +161,17 @@ fn summed(joints: &mut JointSamples) {
 }
 
 /// A body that stands still while the arm moves.
-fn still(samples: &Samples) -> Option<String> {
+fn still_body_note(samples: &Samples) -> Option<String> {
     let tip = samples.tip.as_ref()?;
     let first = tip.position_m.first()?;
     let tip_m = tip.position_m.iter().map(|p| (p - first).norm()).fold(0.0, f64::max);
     let columns = samples.joints.joint_rad.iter();
-    let turned_rad = columns.map(|column| spread(column.iter().copied())).fold(0.0, f64::max);
+    let turned_rad = columns.map(|column| value_range(column.iter().copied())).fold(0.0, f64::max);
     still_tip(tip_m, turned_rad).map(|message| format!("[streams-swapped] {message}"))
 }
 
 /// A stream that is too thin to show movements.
-fn few(samples: &Samples) -> Option<String> {
+fn low_rate_note(samples: &Samples) -> Option<String> {
     let tip = samples.tip.as_ref().map(|tip| ("tip", &tip.time_ns));
     let thin = |(role, time_ns): (&str, &Vec<i64>)| {
         let seconds = (time_ns.last()? - time_ns.first()?) as f64 * 1e-9;
@@ -209,7 +209,7 @@ mod tests {
         let speed = time_ns.iter().map(|ns| t(*ns).cos()).collect();
         let mut joints =
             JointSamples { time_ns: time_ns.clone(), joint_rad: vec![speed], ..JointSamples::default() };
-        summed(&mut joints);
+        integrate_speeds(&mut joints);
         let off = time_ns.iter().zip(&joints.joint_rad[0]).map(|(ns, q)| (t(*ns).sin() - q).abs());
         assert!(off.fold(0.0, f64::max) < 1e-4);
     }

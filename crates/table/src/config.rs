@@ -1,7 +1,7 @@
 //! What is known before association: how wrong the model may be, what hovering means, and in which
 //! order the cavities were meant to be visited.
 
-use crate::keys::nearest;
+use crate::keys::nearest_key;
 use crate::{Board, TableError};
 use serde::{Deserialize, Serialize};
 
@@ -127,7 +127,7 @@ impl AssociationConfig {
         for name in self.visiting_order.iter().flatten() {
             if board.cavity(name).is_none() {
                 let hint =
-                    nearest(name, &names).map(|n| format!(", did you mean `{n}`?")).unwrap_or_default();
+                    nearest_key(name, &names).map(|n| format!(", did you mean `{n}`?")).unwrap_or_default();
                 return Err(TableError::Config {
                     what: format!(
                         "visiting_order names `{name}`, which board `{}` does not have{hint}",

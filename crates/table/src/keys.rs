@@ -15,14 +15,14 @@ pub(crate) fn check_keys(
         Some(key) => Err(TableError::UnknownKey {
             path: path.to_path_buf(),
             key: if place.is_empty() { key.clone() } else { format!("{place}.{key}") },
-            suggestion: nearest(key, known).map(str::to_owned),
+            suggestion: nearest_key(key, known).map(str::to_owned),
             known: known.join(", "),
         }),
     }
 }
 
 /// The candidate most like `word`, if it is similar enough to be a typing error.
-pub(crate) fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
+pub(crate) fn nearest_key<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     candidates
         .iter()
         .map(|&c| (strsim::jaro_winkler(word, c), c))

@@ -57,33 +57,33 @@ impl Compared {
         if errors.is_empty() {
             return None;
         }
-        let before = estimate(errors, |e| e.before_m);
-        let after = estimate(errors, |e| e.after_m);
-        let change = grouped(errors, &|e| e.after_m - e.before_m);
+        let before = estimate_mean(errors, |e| e.before_m);
+        let after = estimate_mean(errors, |e| e.after_m);
+        let change = group_sums(errors, &|e| e.after_m - e.before_m);
         Some(Compared {
             n: errors.len(),
             groups: change.len(),
             before,
             after,
             difference_m: after.mean_m - before.mean_m,
-            difference_ci95_m: interval(&change),
+            difference_ci95_m: mean_ci95_m(&change),
             improvement: 1.0 - after.mean_m / before.mean_m,
         })
     }
 }
 
-fn estimate(errors: &[Error<'_>], value: fn(&Error<'_>) -> f64) -> Estimate {
+fn estimate_mean(errors: &[Error<'_>], value: fn(&Error<'_>) -> f64) -> Estimate {
     let sizes: Vec<f64> = errors.iter().map(|e| value(e).abs()).collect();
     Estimate {
         mean_m: errors.iter().map(value).sum::<f64>() / errors.len() as f64,
-        ci95_m: interval(&grouped(errors, &value)),
+        ci95_m: mean_ci95_m(&group_sums(errors, &value)),
         p95_m: percentile(&sizes, 0.95),
         max_m: sizes.iter().copied().fold(0.0, f64::max),
     }
 }
 
 /// Sum and size of each group.
-fn grouped(errors: &[Error<'_>], value: &dyn Fn(&Error<'_>) -> f64) -> Vec<(f64, f64)> {
+fn group_sums(errors: &[Error<'_>], value: &dyn Fn(&Error<'_>) -> f64) -> Vec<(f64, f64)> {
     let mut groups: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
     for e in errors {
         let (sum, size) = groups.entry(e.group).or_default();
@@ -93,7 +93,7 @@ fn grouped(errors: &[Error<'_>], value: &dyn Fn(&Error<'_>) -> f64) -> Vec<(f64,
     groups.into_values().collect()
 }
 
-fn interval(groups: &[(f64, f64)]) -> Option<[f64; 2]> {
+fn mean_ci95_m(groups: &[(f64, f64)]) -> Option<[f64; 2]> {
     (groups.len() > 1).then(|| grouped_ci95(groups))
 }
 

@@ -23,7 +23,7 @@ pub mod polyline;
 
 pub use clock::{Lateness, Passing, lateness};
 pub use compared::{Compared, Error, Estimate};
-pub use paths::{Against, ClockError, PathError, PathRow, Planned, paths, stretch};
+pub use paths::{Against, ClockError, PathError, PathRow, Planned, compare_paths, stretch_name};
 pub use plane::Plane;
-pub use points::{By, PointError, PointsRow, points};
+pub use points::{By, PointError, PointsRow, compare_points};
 pub use polyline::Polyline;

@@ -91,7 +91,7 @@ impl<'a> Sample<'a> {
             Plane::ALL
                 .map(|plane| [&path.before, &path.after].map(|way| way.distance_m(&error.measured_m, plane)))
         });
-        Sample { error, stretch: stretch(error.motion, error.time_ns), planned_m }
+        Sample { error, stretch: stretch_name(error.motion, error.time_ns), planned_m }
     }
 
     /// Errors before and after [m] in a view.
@@ -109,7 +109,7 @@ impl<'a> Sample<'a> {
 /// Rows for all recordings together and each alone, in every view. `clocks` has one entry a recording.
 ///
 /// Rows against the planned path exist for the motions in `planned`.
-pub fn paths(
+pub fn compare_paths(
     errors: &[PathError],
     recordings: &[String],
     clocks: &[Option<ClockError>],
@@ -123,17 +123,17 @@ pub fn paths(
         let chosen: Vec<&Sample<'_>> = samples.iter().filter(of_it).collect();
         let clock = match recording {
             Some(r) => clocks.get(r).copied().flatten(),
-            None => together(&chosen, clocks),
+            None => combine_clock_errors(&chosen, clocks),
         };
         let subject = recording.map_or("all", |r| recordings[r].as_str());
         let views = |against| Plane::ALL.map(|plane| (plane, against));
         let views = views(Against::Encoders).into_iter().chain(views(Against::Planned));
-        views.filter_map(move |(plane, against)| row(subject, plane, against, &chosen, clock))
+        views.filter_map(move |(plane, against)| table_row(subject, plane, against, &chosen, clock))
     });
     rows.collect()
 }
 
-fn row<'a>(
+fn table_row<'a>(
     subject: &str,
     plane: Plane,
     against: Against,
@@ -149,22 +149,22 @@ fn row<'a>(
     // Where a path lies in space does not depend on when.
     let clock = clock.filter(|_| against == Against::Encoders);
     if let Some(clock) = clock {
-        widen(&mut compared.before, clock.before_m);
-        widen(&mut compared.after, clock.after_m);
+        widen_estimate(&mut compared.before, clock.before_m);
+        widen_estimate(&mut compared.after, clock.after_m);
         let change_m = clock.after_m - clock.before_m;
-        compared.difference_ci95_m = compared.difference_ci95_m.map(|i| wider(i, change_m));
+        compared.difference_ci95_m = compared.difference_ci95_m.map(|i| widen_interval(i, change_m));
     }
     Some(PathRow { subject: subject.to_owned(), plane, against, errors: compared, clock })
 }
 
 /// Name of the stretch of a motion that a moment belongs to: what is independent of other stretches.
-pub fn stretch(motion: DwellId, time_ns: i64) -> String {
+pub fn stretch_name(motion: DwellId, time_ns: i64) -> String {
     let at = time_ns.div_euclid((STRETCH_S * 1e9) as i64);
     format!("{motion}.{at}")
 }
 
 /// Clocks of different recordings err independently: their effects on the common mean add in square.
-fn together(samples: &[&Sample<'_>], clocks: &[Option<ClockError>]) -> Option<ClockError> {
+fn combine_clock_errors(samples: &[&Sample<'_>], clocks: &[Option<ClockError>]) -> Option<ClockError> {
     let mut sizes: BTreeMap<usize, f64> = BTreeMap::new();
     samples.iter().for_each(|s| *sizes.entry(s.error.motion.recording).or_default() += 1.0);
     let n = samples.len() as f64;
@@ -181,12 +181,12 @@ fn together(samples: &[&Sample<'_>], clocks: &[Option<ClockError>]) -> Option<Cl
     })
 }
 
-fn widen(estimate: &mut Estimate, clock_m: f64) {
-    estimate.ci95_m = estimate.ci95_m.map(|interval| wider(interval, clock_m));
+fn widen_estimate(estimate: &mut Estimate, clock_m: f64) {
+    estimate.ci95_m = estimate.ci95_m.map(|interval| widen_interval(interval, clock_m));
 }
 
 /// An interval with an independent normal error of standard deviation `sigma_m` added.
-fn wider([low, high]: [f64; 2], sigma_m: f64) -> [f64; 2] {
+fn widen_interval([low, high]: [f64; 2], sigma_m: f64) -> [f64; 2] {
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
     let half = half.hypot(NORMAL_95 * sigma_m);
     [centre - half, centre + half]
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn planes_see_their_part_of_an_offset() {
-        let rows = paths(&straight(), &["one".into()], &[None], &BTreeMap::new());
+        let rows = compare_paths(&straight(), &["one".into()], &[None], &BTreeMap::new());
         let mean = |plane| find(&rows, plane, Against::Encoders).before.mean_m;
         assert!((mean(Plane::Space) - 5e-3).abs() < 1e-12);
         assert!((mean(Plane::Xy) - 3e-3).abs() < 1e-12);
@@ -238,7 +238,7 @@ mod tests {
         errors.iter_mut().for_each(|e| e.measured_m = e.before_m - Vector3::new(2e-3, 0.0, 0.0));
         let path = Polyline::through(planned_m).expect("points");
         let planned = BTreeMap::from([(errors[0].motion, Planned { before: path.clone(), after: path })]);
-        let rows = paths(&errors, &["one".into()], &[None], &planned);
+        let rows = compare_paths(&errors, &["one".into()], &[None], &planned);
         assert!((find(&rows, Plane::Space, Against::Encoders).before.mean_m - 2e-3).abs() < 1e-12);
         // Only the first two samples lie before the beginning of the path.
         assert!(find(&rows, Plane::Space, Against::Planned).before.mean_m < 5e-6);
@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn an_uncertain_clock_widens_the_interval() {
         let clock = ClockError { sigma_s: 1e-3, before_m: 0.0, after_m: 2e-4 };
-        let rows = paths(&straight(), &["one".into()], &[Some(clock)], &BTreeMap::new());
+        let rows = compare_paths(&straight(), &["one".into()], &[Some(clock)], &BTreeMap::new());
         let [low, high] = find(&rows, Plane::Space, Against::Encoders).after.ci95_m.expect("five stretches");
         assert!((0.5 * (high - low) - NORMAL_95 * 2e-4).abs() < 1e-9, "{low} {high}");
     }

@@ -53,11 +53,11 @@ pub enum By {
 
 /// All rows: all points, each recording, seated against tracked, each joint's arrival, each axis. Groups without a point
 /// have no row. `recordings` and `joints` are names.
-pub fn points(errors: &[PointError], recordings: &[String], joints: &[String]) -> Vec<PointsRow> {
+pub fn compare_points(errors: &[PointError], recordings: &[String], joints: &[String]) -> Vec<PointsRow> {
     let norm = |v: &Vector3<f64>| v.norm();
-    let mut rows: Vec<PointsRow> = row(errors, "all", By::All, |_| true, norm).into_iter().collect();
+    let mut rows: Vec<PointsRow> = table_row(errors, "all", By::All, |_| true, norm).into_iter().collect();
     for (index, name) in recordings.iter().enumerate() {
-        rows.extend(row(errors, name, By::Recording, |e| e.dwell.recording == index, norm));
+        rows.extend(table_row(errors, name, By::Recording, |e| e.dwell.recording == index, norm));
     }
     type IsOf = fn(&PointError) -> bool;
     let kinds: [(&str, IsOf); 3] = [
@@ -67,21 +67,21 @@ pub fn points(errors: &[PointError], recordings: &[String], joints: &[String]) -
     ];
     // All of one kind are the first row.
     for (name, is_of) in kinds.into_iter().filter(|(_, is_of)| !errors.iter().all(is_of)) {
-        rows.extend(row(errors, name, By::Reference, is_of, norm));
+        rows.extend(table_row(errors, name, By::Reference, is_of, norm));
     }
     for (joint, name) in joints.iter().enumerate() {
         for (way, sign) in [(Arrival::Positive, "+"), (Arrival::Negative, "-")] {
             let came = |e: &PointError| e.arrival.get(joint) == Some(&way);
-            rows.extend(row(errors, &format!("{name} {sign}"), By::Arrival, came, norm));
+            rows.extend(table_row(errors, &format!("{name} {sign}"), By::Arrival, came, norm));
         }
     }
     for (axis, name) in ["x", "y", "z"].iter().enumerate() {
-        rows.extend(row(errors, name, By::Axis, |_| true, |v| v[axis]));
+        rows.extend(table_row(errors, name, By::Axis, |_| true, |v| v[axis]));
     }
     rows
 }
 
-fn row(
+fn table_row(
     errors: &[PointError],
     subject: &str,
     by: By,
@@ -122,7 +122,7 @@ mod tests {
             error(0, 1, [0.0, 0.0, -1.0], Arrival::Negative),
             error(1, 0, [-3.0, 0.0, 0.0], Arrival::Positive),
         ];
-        let rows = points(&errors, &["flat".into(), "roll".into()], &["joint1".into()]);
+        let rows = compare_points(&errors, &["flat".into(), "roll".into()], &["joint1".into()]);
         let mean = |subject: &str| {
             rows.iter().find(|r| r.subject == subject).map(|r| (r.errors.n, r.errors.before.mean_m))
         };

@@ -35,7 +35,7 @@ impl Polyline {
         while let Some((from, to)) = open.pop() {
             let away = |i: &usize| {
                 let at = &self.points_m[*i];
-                (at - nearest(at, &self.points_m[from], &self.points_m[to])).norm()
+                (at - nearest_on_segment(at, &self.points_m[from], &self.points_m[to])).norm()
             };
             let farthest = (from + 1..to).max_by(|a, b| away(a).total_cmp(&away(b)));
             if let Some(corner) = farthest.filter(|i| away(i) > within_m) {
@@ -74,12 +74,12 @@ impl Polyline {
         let at = plane.seen(point_m);
         let first = self.points_m.first().map_or(f64::INFINITY, |p| (at - plane.seen(p)).norm());
         let pieces = self.points_m.windows(2).map(|piece| [plane.seen(&piece[0]), plane.seen(&piece[1])]);
-        pieces.map(|[from, to]| (at - nearest(&at, &from, &to)).norm()).fold(first, f64::min)
+        pieces.map(|[from, to]| (at - nearest_on_segment(&at, &from, &to)).norm()).fold(first, f64::min)
     }
 }
 
 /// The point of a straight piece nearest to another point.
-fn nearest(at: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
+fn nearest_on_segment(at: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
     let along = to - from;
     let length_square = along.norm_squared();
     if length_square == 0.0 {

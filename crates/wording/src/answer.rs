@@ -1,7 +1,7 @@
 //! What a run says about its model in one word and one sentence: the same in every output.
 
 use crate::headline::headline;
-use armcal_core::{Certainty, SetupReport, printable};
+use armcal_core::{Certainty, SetupReport, printable_name};
 use armcal_result::{Run, Undiagnosed};
 
 /// What a run says about its model in one word and one sentence.
@@ -43,12 +43,12 @@ pub fn answer(run: &Run) -> Answer {
 /// The mistakes of the setup in one sentence; none where there is none.
 fn setup_sentence(setup: &SetupReport) -> Option<String> {
     let messages: Vec<&str> = setup.mistakes().map(|f| f.message.as_str()).collect();
-    (!messages.is_empty()).then(|| printable(&format!("Setup first: {}.", messages.join("; also, "))))
+    (!messages.is_empty()).then(|| printable_name(&format!("Setup first: {}.", messages.join("; also, "))))
 }
 
 /// The change of the setup that leaves less of the error than what is named physically, in one sentence.
 fn setup_beside(setup: &SetupReport) -> Option<String> {
     let tried =
         setup.findings.iter().find(|f| f.certainty == Certainty::Possible && f.before_mm.is_some())?;
-    Some(printable(&format!("Or the setup: {}.", tried.message)))
+    Some(printable_name(&format!("Or the setup: {}.", tried.message)))
 }

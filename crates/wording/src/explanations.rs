@@ -10,12 +10,12 @@ pub fn explanations(d: &Diagnosis) -> Vec<Explanation> {
     let mut say = |number: &str, sentence: String| {
         all.push(Explanation { number: number.to_string(), sentence });
     };
-    say("verdict", verdict(d));
+    say("verdict", verdict_sentence(d));
     say(
         "p_nothing",
         format!(
             "of all explanations that were scored by dwells their fits did not see, nothing has a probability of {}",
-            probability(d.p_nothing)
+            probability_text(d.p_nothing)
         ),
     );
     say(
@@ -30,7 +30,7 @@ pub fn explanations(d: &Diagnosis) -> Vec<Explanation> {
         ),
     );
     for e in &d.effects {
-        effect(e, &mut say);
+        explain_effect(e, &mut say);
     }
     let found = match d.effects.is_empty() && d.unlisted.is_empty() {
         true => String::new(),
@@ -125,7 +125,7 @@ pub fn nested_sentence(nested: &Nested) -> String {
     )
 }
 
-fn verdict(d: &Diagnosis) -> String {
+fn verdict_sentence(d: &Diagnosis) -> String {
     let rest = match (&d.unknown, d.rest_may_be_shape) {
         (Some(_), true) => {
             "; what is left over is so small that it may be the shape of an effect that was found"
@@ -154,13 +154,13 @@ fn verdict(d: &Diagnosis) -> String {
     }
 }
 
-fn effect(e: &FoundEffect, say: &mut dyn FnMut(&str, String)) {
+fn explain_effect(e: &FoundEffect, say: &mut dyn FnMut(&str, String)) {
     say(
         &format!("{}.probability", e.name),
         format!(
             "given the other effects found, {} is the cause with probability {} among all that was refitted in its place",
             e.set.join(" or "),
-            probability(e.probability)
+            probability_text(e.probability)
         ),
     );
     say(
@@ -210,7 +210,7 @@ fn effect(e: &FoundEffect, say: &mut dyn FnMut(&str, String)) {
 }
 
 /// A probability, small ones as what they are below.
-fn probability(p: f64) -> String {
+fn probability_text(p: f64) -> String {
     if p < 5e-4 { "less than 0.001".to_owned() } else { format!("{p:.3}") }
 }
 

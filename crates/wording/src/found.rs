@@ -2,9 +2,9 @@
 
 use crate::drivers::{channel_told, driver_told};
 use crate::explanations::nested_sentence;
-use crate::sizes::{clear, size_in_table, sizes_of};
+use crate::sizes::{half_interval_ratio, size_in_table, sizes_of};
 use armcal_calibrate::HeldOut;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport, Verdict};
 use armcal_model::{EffectKind, effects_toml, find};
 use armcal_result::Called;
@@ -18,9 +18,15 @@ const IMPROBABLE: f64 = 0.05;
 
 /// What was found: with names, without one, and what the choice among them is worth; one entry each.
 pub fn all_found(called: &Called, d: &Diagnosis) -> Vec<String> {
-    let nested = d.nested.iter().map(|n| printable(&nested_sentence(n)));
-    let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e)));
-    let all = d.effects.iter().map(found).chain(shown_unlisted(d).map(unlisted)).chain(beside).chain(nested);
+    let nested = d.nested.iter().map(|n| printable_name(&nested_sentence(n)));
+    let beside = d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", named_effect_text(e)));
+    let all = d
+        .effects
+        .iter()
+        .map(named_effect_text)
+        .chain(shown_unlisted(d).map(unlisted_text))
+        .chain(beside)
+        .chain(nested);
     all.map(|said| called.in_words(&said)).collect()
 }
 
@@ -29,7 +35,7 @@ pub fn briefly_found(called: &Called, d: &Diagnosis) -> Vec<String> {
     let falls = |h: &HeldOut| format!("linearised from {:.3} to {:.3} mm", h.before, h.after);
     let sizes = |e: &FoundEffect| match e.parameters.len() {
         ..=FEW_SIZES => sizes_of(e),
-        n if e.parameters.iter().all(|p| clear(p) < 1.0) => {
+        n if e.parameters.iter().all(|p| half_interval_ratio(p) < 1.0) => {
             format!("none of its {n} sizes is determined by itself")
         }
         _ => size_in_table(&e.parameters),
@@ -47,7 +53,7 @@ pub fn briefly_found(called: &Called, d: &Diagnosis) -> Vec<String> {
         .beside_curves()
         .iter()
         .map(|e| format!("{WITH_CURVES}{}: {}", e.set.join(" or "), falls(&e.places)));
-    named.chain(unlisted).chain(beside).map(|said| called.in_words(&printable(&said))).collect()
+    named.chain(unlisted).chain(beside).map(|said| called.in_words(&printable_name(&said))).collect()
 }
 
 /// What is said before an effect that shows only beside error curves of joints.
@@ -59,7 +65,7 @@ pub fn kind_of(e: &FoundEffect) -> Option<&'static EffectKind> {
 }
 
 /// A named effect: its sizes, what it takes of the error, what stands beside it.
-pub fn found(e: &FoundEffect) -> String {
+pub fn named_effect_text(e: &FoundEffect) -> String {
     let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
     let contrast = match &e.contrast {
         Some(c) if c.agrees => {
@@ -74,7 +80,7 @@ pub fn found(e: &FoundEffect) -> String {
             r.name, r.behind_nats, r.behind_se, r.places.after
         )
     });
-    printable(&format!(
+    printable_name(&format!(
         "{}{set}: {}; linearised, each place left out in turn: from {:.3} to {:.3} mm (change {:.3} to {:.3}, 95 \
          %){rival}{contrast}",
         e.name,
@@ -87,12 +93,12 @@ pub fn found(e: &FoundEffect) -> String {
 }
 
 /// The `[[effects]]` table for something unlisted; empty where nothing offered reaches its shape.
-pub fn pasted(u: &UnknownReport) -> String {
+pub fn unlisted_toml(u: &UnknownReport) -> String {
     u.effect().and_then(|effect| effects_toml(&[effect]).ok()).unwrap_or_default()
 }
 
 /// Something without a name: where it enters, over what, what it takes of the error, its shape.
-pub fn unlisted(u: &UnknownReport) -> String {
+pub fn unlisted_text(u: &UnknownReport) -> String {
     let range = match (u.shape.first(), u.shape.last()) {
         // An angle that counts with the direction of arrival is an angle.
         (Some(from), Some(to))
@@ -118,7 +124,7 @@ pub fn unlisted(u: &UnknownReport) -> String {
         .expression
         .as_ref()
         .map_or(String::new(), |e| format!("; as a formula on {}: {}", e.acts_on, e.formula));
-    printable(&format!(
+    printable_name(&format!(
         "unlisted, at {} over {}: linearised, each place left out in turn: from {:.3} to {:.3} mm with \
          its shape{range}{ripple}{formula}",
         channel_told(&u.channel),

@@ -2,7 +2,7 @@
 
 use crate::drivers::{channel_told, driver_told};
 use crate::found::kind_of;
-use armcal_core::{listed, printable};
+use armcal_core::{list_names, printable_name};
 use armcal_diagnose::{Diagnosis, UnknownReport, Verdict};
 use armcal_model::{EffectKind, EffectSpec, Family};
 use armcal_result::Called;
@@ -13,19 +13,22 @@ const OVERDECLARED: f64 = 1.5;
 
 /// The answer in one sentence.
 pub fn headline(called: &Called, d: &Diagnosis) -> String {
-    let ties = called.ties.iter().map(|(name, all)| tied(name, all));
-    let also = overdeclared(d).into_iter().chain(ties);
+    let ties = called.ties.iter().map(|(name, all)| tie_sentence(name, all));
+    let also = excess_noise_sentence(d).into_iter().chain(ties);
     let told = [as_spelt(called, d)].into_iter().chain(also).collect::<Vec<_>>().join(" ");
     called.in_words(&told) + &joints_told(called, d)
 }
 
 /// That a name in the model stands for one of several.
-fn tied(name: &str, all: &[String]) -> String {
-    printable(&format!("In the model, {name} is one of {}: the data did not tell which.", listed(all)))
+fn tie_sentence(name: &str, all: &[String]) -> String {
+    printable_name(&format!(
+        "In the model, {name} is one of {}: the data did not tell which.",
+        list_names(all)
+    ))
 }
 
 /// That errors end below what the declared noise gives, where they do, and by how much.
-fn overdeclared(d: &Diagnosis) -> Option<String> {
+fn excess_noise_sentence(d: &Diagnosis) -> Option<String> {
     let (floor, error) = (d.floor_mm, d.holdout_mm.after);
     (floor > OVERDECLARED * error).then(|| {
         format!(
@@ -47,7 +50,8 @@ fn joints_told(called: &Called, d: &Diagnosis) -> String {
     let targets = of_effects.filter_map(|spec| spec.target);
     let curves = d.unlisted.iter().chain(&d.unknown).filter_map(|u| u.own_angle());
     let joints: BTreeSet<usize> = targets.chain(curves).collect();
-    let told = |joint: &usize| Some(format!(" Joint {} is {}.", joint + 1, printable(names.get(*joint)?)));
+    let told =
+        |joint: &usize| Some(format!(" Joint {} is {}.", joint + 1, printable_name(names.get(*joint)?)));
     joints.iter().filter_map(told).collect()
 }
 
@@ -65,13 +69,17 @@ fn as_spelt(called: &Called, d: &Diagnosis) -> String {
         }
         Verdict::Identified => {
             let probability = d.probability.map_or(String::new(), |p| format!("probability {p:.2}, "));
-            let names = printable(&d.names.join(", "));
+            let names = printable_name(&d.names.join(", "));
             let meaning = one_kind(d).map_or(String::new(), |kind| format!(" In words: {}.", kind.summary));
-            format!("Missing: {names} ({probability}p = {:.3}){}.{meaning}", d.p_adjusted, beside(d))
+            format!(
+                "Missing: {names} ({probability}p = {:.3}){}.{meaning}",
+                d.p_adjusted,
+                remaining_error_text(d)
+            )
         }
         Verdict::Ambiguous => {
             let sets: Vec<String> = d.effects.iter().map(|e| one_of(&e.set)).collect();
-            format!("Missing: {}{}.", printable(&sets.join("; and ")), beside(d))
+            format!("Missing: {}{}.", printable_name(&sets.join("; and ")), remaining_error_text(d))
         }
         Verdict::Unknown if d.unlisted.len() > 1 && curved_joints(d).len() == d.unlisted.len() => {
             let also: Vec<String> = d.beside_curves().iter().map(|e| e.set.join(" or ")).collect();
@@ -81,7 +89,7 @@ fn as_spelt(called: &Called, d: &Diagnosis) -> String {
                 format!("; with that, also {}", also.join("; and "))
             };
             let joints = curved_joints(d).join(", ");
-            printable(&format!(
+            printable_name(&format!(
                 "Something unlisted is missing: joints {joints} each err over their own angle{also}."
             ))
         }
@@ -90,12 +98,12 @@ fn as_spelt(called: &Called, d: &Diagnosis) -> String {
                 Some(joint) => format!(
                     "Something unlisted is missing: joint {} errs over its own angle ({}).",
                     joint + 1,
-                    printable(&u.driver)
+                    printable_name(&u.driver)
                 ),
                 None => format!(
                     "Something unlisted is missing: it enters at {} and depends on {}.",
-                    printable(&channel_told(&u.channel)),
-                    printable(&driver_told(&u.driver))
+                    printable_name(&channel_told(&u.channel)),
+                    printable_name(&driver_told(&u.driver))
                 ),
             },
             None => "Something is missing, and nothing listed explains it.".to_owned(),
@@ -104,7 +112,7 @@ fn as_spelt(called: &Called, d: &Diagnosis) -> String {
             let sentence = d.unexplained.as_ref().map(armcal_diagnose::Unexplained::sentence);
             let sentence =
                 sentence.unwrap_or_else(|| "nothing that was tried predicts the errors".to_owned());
-            printable(&format!("Unexplained: {sentence}."))
+            printable_name(&format!("Unexplained: {sentence}."))
         }
     }
 }
@@ -130,7 +138,7 @@ fn one_of(set: &[String]) -> String {
 }
 
 /// What stands beside the names: how much of the error they leave.
-fn beside(d: &Diagnosis) -> String {
+fn remaining_error_text(d: &Diagnosis) -> String {
     d.unexplained.as_ref().map_or(String::new(), |u| {
         format!("; with it {:.3} mm remain, {:.1} times {}", u.error_mm, u.times_floor, u.measure())
     })

@@ -2,15 +2,15 @@
 
 use crate::found::kind_of;
 use crate::look_at::look_at;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_diagnose::Diagnosis;
 use armcal_model::Family;
 use armcal_result::Called;
 
 /// What to do next, one step an entry.
-pub fn next(called: &Called, d: &Diagnosis) -> Vec<String> {
-    let recorded = d.record_next.iter().map(|r| called.in_words(&printable(r)));
-    added(called, d).into_iter().chain(looked_at(called, d)).chain(recorded).collect()
+pub fn next_steps(called: &Called, d: &Diagnosis) -> Vec<String> {
+    let recorded = d.record_next.iter().map(|r| called.in_words(&printable_name(r)));
+    addition_step(called, d).into_iter().chain(looked_at(called, d)).chain(recorded).collect()
 }
 
 /// What to look at on the rig, once for all effects of one kind; only where one name is left.
@@ -26,13 +26,13 @@ fn looked_at(called: &Called, d: &Diagnosis) -> Vec<String> {
     let step = |(advice, names): (&str, Vec<&str>)| {
         let (capital, rest) = advice.split_at(1);
         let advice = format!("{}{}", capital.to_ascii_lowercase(), rest.trim_end_matches('.'));
-        printable(&format!("{}: {advice}", names.join(", ")))
+        printable_name(&format!("{}: {advice}", names.join(", ")))
     };
     steps.into_iter().map(|s| called.in_words(&step(s))).collect()
 }
 
 /// What adding it to the model does, where something was found and a calibration with it confirms it.
-fn added(called: &Called, d: &Diagnosis) -> Option<String> {
+fn addition_step(called: &Called, d: &Diagnosis) -> Option<String> {
     if !called.is_refitted {
         return None;
     }

@@ -2,23 +2,23 @@
 //! where it does not. Of any other run nothing.
 
 use armcal_calibrate::{INADEQUATE, PairedDifference};
-use armcal_core::printable;
-use armcal_core::units::millimetres;
+use armcal_core::printable_name;
+use armcal_core::units::format_mm;
 use armcal_result::Run;
 
 /// What the calibration is worth on another day.
-pub fn transfer(run: &Run) -> String {
+pub fn transfer_sentence(run: &Run) -> String {
     let Some(transfer) = &run.transfer else { return String::new() };
     let side = &transfer.holdout;
     format!(
         " On recordings that it never saw it is {} mm (nominal {} mm).",
-        millimetres(side.fitted.mean_m),
-        millimetres(side.nominal.mean_m)
+        format_mm(side.fitted.mean_m),
+        format_mm(side.nominal.mean_m)
     )
 }
 
 /// Where an effect is missing and nobody looked for it: what does.
-pub fn effect(run: &Run) -> Option<String> {
+pub fn missing_effect_step(run: &Run) -> Option<String> {
     if !run.is_pool() {
         return None;
     }
@@ -30,8 +30,8 @@ pub fn effect(run: &Run) -> Option<String> {
         format!(
             "errors are {times:.1} times what the declared noise gives, most in `{}` ({} mm): pool again with `[diagnosis] enabled = true`, which \
              looks for what is missing and for what moved between the recordings",
-            printable(&run.recordings[worst].name),
-            millimetres(errors[worst].calibrated.mean_m)
+            printable_name(&run.recordings[worst].name),
+            format_mm(errors[worst].calibrated.mean_m)
         )
     })
 }
@@ -40,7 +40,7 @@ pub fn effect(run: &Run) -> Option<String> {
 const WORTH_A_WORD: f64 = 0.1;
 
 /// Where a day that the calibration never saw errs more by more than chance.
-pub fn days(run: &Run) -> Option<String> {
+pub fn unseen_day_step(run: &Run) -> Option<String> {
     let unseen = run.transfer.as_ref()?;
     let more = PairedDifference::between(&run.observations, &run.calibration, unseen)?;
     let [low, high] = more.ci95_m;
@@ -49,9 +49,9 @@ pub fn days(run: &Run) -> Option<String> {
         format!(
             "on a day that it never saw it errs {} mm more (95 % {} to {}): look for what changes from day to day, and give that to \
              each recording (`[pool] per_recording`), or pool more days",
-            millimetres(more.difference_m),
-            millimetres(low),
-            millimetres(high)
+            format_mm(more.difference_m),
+            format_mm(low),
+            format_mm(high)
         )
     })
 }

@@ -3,11 +3,11 @@
 
 use crate::answer::answer;
 use crate::found::{all_found, briefly_found};
-use crate::next::next;
+use crate::next::next_steps;
 use crate::pool_story;
 use crate::text::conclusion;
 use crate::told_warning::{ToldWarning, gravest_first};
-use crate::two_arms::scale;
+use crate::two_arms::scale_step;
 use armcal_result::{Run, Status};
 
 /// What to do where the setup contradicts the data.
@@ -46,24 +46,26 @@ impl Story {
         let status = run.status();
         let (diagnosis, called) = (run.diagnosis.as_ref(), run.called());
         Story {
-            lamp: lamp(answer.word, status),
-            calibration: conclusion(&run.calibration) + &pool_story::transfer(run),
+            lamp: lamp_status(answer.word, status),
+            calibration: conclusion(&run.calibration) + &pool_story::transfer_sentence(run),
             found: diagnosis.map_or_else(Vec::new, |d| all_found(&called, d)),
             found_briefly: diagnosis.map_or_else(Vec::new, |d| briefly_found(&called, d)),
             status,
             incomplete: matches!(answer.word, "identified" | "ambiguous" | "unknown"),
             next: match diagnosis {
-                Some(d) => {
-                    next(&called, d).into_iter().chain(pool_story::days(run)).chain(scale(run)).collect()
-                }
-                None if answer.word == "setup" => vec![MEND.to_owned()],
-                None => pool_story::effect(run)
+                Some(d) => next_steps(&called, d)
                     .into_iter()
-                    .chain(pool_story::days(run))
-                    .chain(scale(run))
+                    .chain(pool_story::unseen_day_step(run))
+                    .chain(scale_step(run))
+                    .collect(),
+                None if answer.word == "setup" => vec![MEND.to_owned()],
+                None => pool_story::missing_effect_step(run)
+                    .into_iter()
+                    .chain(pool_story::unseen_day_step(run))
+                    .chain(scale_step(run))
                     .collect(),
             },
-            warnings: warnings(run),
+            warnings: warnings_by_severity(run),
             missing: answer.sentence,
         }
     }
@@ -77,7 +79,7 @@ impl Story {
         warnings: Vec<ToldWarning>,
     ) -> Story {
         Story {
-            lamp: lamp("not_diagnosed", status),
+            lamp: lamp_status("not_diagnosed", status),
             calibration,
             missing: String::new(),
             found_briefly: found.clone(),
@@ -139,7 +141,7 @@ pub fn status_sentence(status: Status) -> &'static str {
     }
 }
 
-fn warnings(run: &Run) -> Vec<ToldWarning> {
+fn warnings_by_severity(run: &Run) -> Vec<ToldWarning> {
     let names = run.recording_names();
     let of_recordings = run.recordings.iter().flat_map(|r| {
         let told = |w| ToldWarning::new(&names, Some(&r.name), w);
@@ -150,7 +152,7 @@ fn warnings(run: &Run) -> Vec<ToldWarning> {
 }
 
 /// Never a verdict of success where the result does not stand.
-fn lamp(verdict: &'static str, status: Status) -> &'static str {
+fn lamp_status(verdict: &'static str, status: Status) -> &'static str {
     match status {
         Status::Ok => verdict,
         _ if matches!(verdict, "unexplained" | "setup") => verdict,
@@ -164,11 +166,11 @@ mod tests {
 
     #[test]
     fn a_lamp_is_a_verdict_of_success_only_where_the_result_stands() {
-        assert_eq!(lamp("nothing_missing", Status::Ok), "nothing_missing");
-        assert_eq!(lamp("nothing_missing", Status::Inadequate), "inadequate");
-        assert_eq!(lamp("nothing_missing", Status::DataLost), "data_lost");
-        assert_eq!(lamp("identified", Status::Inadequate), "inadequate");
-        assert_eq!(lamp("unexplained", Status::Inadequate), "unexplained");
-        assert_eq!(lamp("setup", Status::DataLost), "setup");
+        assert_eq!(lamp_status("nothing_missing", Status::Ok), "nothing_missing");
+        assert_eq!(lamp_status("nothing_missing", Status::Inadequate), "inadequate");
+        assert_eq!(lamp_status("nothing_missing", Status::DataLost), "data_lost");
+        assert_eq!(lamp_status("identified", Status::Inadequate), "inadequate");
+        assert_eq!(lamp_status("unexplained", Status::Inadequate), "unexplained");
+        assert_eq!(lamp_status("setup", Status::DataLost), "setup");
     }
 }

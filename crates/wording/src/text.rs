@@ -2,7 +2,7 @@
 
 use armcal_calibrate::{Calibration, Estimate, SideErrors};
 use armcal_core::Unit;
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 
 /// The result in one sentence, about held-out points where there are any.
 pub fn conclusion(calibration: &Calibration) -> String {
@@ -12,7 +12,7 @@ pub fn conclusion(calibration: &Calibration) -> String {
 /// The same about errors of another name.
 pub fn conclusion_about(calibration: &Calibration, error: &str) -> String {
     let floor = match calibration.noise_floor_m {
-        floor if floor.is_finite() => format!("; the declared noise gives {} mm.", millimetres(floor)),
+        floor if floor.is_finite() => format!("; the declared noise gives {} mm.", format_mm(floor)),
         _ => ".".into(),
     };
     let points = |side: &SideErrors| match side.fitted.n {
@@ -22,26 +22,26 @@ pub fn conclusion_about(calibration: &Calibration, error: &str) -> String {
     if calibration.held_out() {
         let side = &calibration.holdout;
         let held_out = points(side).replacen(' ', " held-out ", 1);
-        return format!("On {held_out} the mean {error} {}{floor}", change(side));
+        return format!("On {held_out} the mean {error} {}{floor}", error_change_text(side));
     }
     if calibration.train.fitted.n > 0 {
         let side = &calibration.train;
         return format!(
             "Nothing was held out: on the {} the fit saw, the mean {error} {}{floor}",
             points(side),
-            change(side)
+            error_change_text(side)
         );
     }
     "No observation took part, so there is no error to state.".into()
 }
 
 /// "falls from 21.30 to 0.31 mm (98.5 %)".
-fn change(side: &SideErrors) -> String {
+fn error_change_text(side: &SideErrors) -> String {
     let (before_m, after_m) = (side.nominal.mean_m, side.fitted.mean_m);
     if !(before_m.is_finite() && after_m.is_finite()) {
         return "is not a number".into();
     }
-    let (before, after) = (millimetres(before_m), millimetres(after_m));
+    let (before, after) = (format_mm(before_m), format_mm(after_m));
     let percent = 100.0 * (before_m - after_m) / before_m;
     match before_m.total_cmp(&after_m) {
         std::cmp::Ordering::Greater => format!("falls from {before} to {after} mm ({percent:.1} %)"),
@@ -73,11 +73,11 @@ pub fn in_display_unit(unit: Unit, si: f64) -> String {
 pub fn estimate_shown(e: &Estimate) -> [String; 4] {
     let half = (e.ci95[1] - e.ci95[0]) / 2.0;
     [e.parameter.nominal, e.value, e.value - e.parameter.nominal, half]
-        .map(|si| supported(e.parameter.unit, si, half))
+        .map(|si| supported_digits(e.parameter.unit, si, half))
 }
 
 /// An SI value in the unit shown to people, with the digits that half the width of its interval supports: two of its own.
-pub fn supported(unit: Unit, si: f64, half_si: f64) -> String {
+pub fn supported_digits(unit: Unit, si: f64, half_si: f64) -> String {
     let (shown, exponent) = (unit.to_display(si), unit.to_display(half_si).abs().log10().floor());
     // Below five places, and where there is no interval, the usual way.
     if !(shown.is_finite() && exponent.is_finite() && exponent >= -4.0) {
@@ -93,7 +93,7 @@ pub fn supported(unit: Unit, si: f64, half_si: f64) -> String {
 }
 
 /// What is to be known of an estimate beside its numbers.
-pub fn remark(e: &Estimate) -> &'static str {
+pub fn estimate_remark(e: &Estimate) -> &'static str {
     match (e.determined, e.at_bound) {
         (true, false) => "",
         (true, true) => "at bound",
@@ -114,16 +114,17 @@ mod tests {
 
     #[test]
     fn a_change_is_called_by_its_direction() {
-        assert_eq!(change(&side(3, 0.0213, 0.00031)), "falls from 21.30 to 0.31 mm (98.5 %)");
-        assert_eq!(change(&side(3, 0.001, 0.0015)), "rises from 1.00 to 1.50 mm (50.0 % worse)");
-        assert_eq!(change(&side(3, 0.001, 0.001)), "stays at 1.00 mm");
-        assert_eq!(change(&side(3, 0.0, 0.001)), "rises from 0.00 to 1.00 mm");
-        assert_eq!(change(&side(3, f64::NAN, 0.001)), "is not a number");
+        assert_eq!(error_change_text(&side(3, 0.0213, 0.00031)), "falls from 21.30 to 0.31 mm (98.5 %)");
+        assert_eq!(error_change_text(&side(3, 0.001, 0.0015)), "rises from 1.00 to 1.50 mm (50.0 % worse)");
+        assert_eq!(error_change_text(&side(3, 0.001, 0.001)), "stays at 1.00 mm");
+        assert_eq!(error_change_text(&side(3, 0.0, 0.001)), "rises from 0.00 to 1.00 mm");
+        assert_eq!(error_change_text(&side(3, f64::NAN, 0.001)), "is not a number");
     }
 
     #[test]
     fn numbers_have_the_digits_that_their_interval_supports() {
-        let mm = |si, half| [supported(Unit::Metre, si, half), supported(Unit::Metre, half, half)];
+        let mm =
+            |si, half| [supported_digits(Unit::Metre, si, half), supported_digits(Unit::Metre, half, half)];
         assert_eq!(mm(0.074_074, 0.000_588), ["74.07", "0.59"]);
         assert_eq!(mm(0.074_074, 0.0123), ["74", "12"]);
         assert_eq!(mm(-1e-6, 0.000_588), ["0.00", "0.59"]);

@@ -1,6 +1,6 @@
 //! A warning as people are told it, in terminal, page and viewer alike.
 
-use armcal_core::{Severity, Warning, printable};
+use armcal_core::{Severity, Warning, printable_name};
 use armcal_result::RecordingNames;
 
 /// A warning in words.
@@ -19,8 +19,8 @@ pub struct ToldWarning {
 impl ToldWarning {
     /// Of a recording of this name, or of the whole run.
     pub fn new(names: &RecordingNames, recording: Option<&str>, w: &Warning) -> ToldWarning {
-        let words = |text: &str| names.in_words(&printable(text));
-        let of = recording.map_or_else(String::new, |name| format!("{}: ", printable(name)));
+        let words = |text: &str| names.in_words(&printable_name(text));
+        let of = recording.map_or_else(String::new, |name| format!("{}: ", printable_name(name)));
         ToldWarning {
             severity: w.severity,
             code: w.code.to_string(),

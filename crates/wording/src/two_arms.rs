@@ -1,19 +1,19 @@
 //! Tips that are joined, in words.
 
-use armcal_core::printable;
-use armcal_core::units::millimetres;
+use armcal_core::printable_name;
+use armcal_core::units::format_mm;
 use armcal_result::{Closing, Run, TwoArms, link_length_m};
 
 /// How the words for a direction begin in which both arms grow together.
 const SCALE: &str = "scale (every length";
 
 /// `right and left, their tips in one point`; `None` where nothing is joined.
-pub fn about(run: &Run) -> Option<String> {
-    let points = TwoArms::of(run)?.arms.map(printable).join(" and ");
+pub fn joined_tips_text(run: &Run) -> Option<String> {
+    let points = TwoArms::of(run)?.arms.map(printable_name).join(" and ");
     let whose = if run.model.chain().arms().is_empty() { "" } else { "their tips " };
     Some(match link_length_m(run, &run.model.nominal()) {
         None => format!("{points}, {whose}in one point"),
-        Some(length_m) => format!("{points}, {whose}on a rigid link of {} mm", millimetres(length_m)),
+        Some(length_m) => format!("{points}, {whose}on a rigid link of {} mm", format_mm(length_m)),
     })
 }
 
@@ -28,7 +28,7 @@ pub fn errors_are(run: &Run) -> &'static str {
 }
 
 /// What to do where an arm, or both together, may grow.
-pub fn scale(run: &Run) -> Option<String> {
+pub fn scale_step(run: &Run) -> Option<String> {
     let open = run.calibration.fit.undetermined.iter().any(|u| u.text.contains(SCALE));
     let or = match run.model.chain().arms() {
         [] => "let a sensor see one of them ([streams.tip])",

@@ -34,7 +34,7 @@ const CPU_S: f64 = 0.15;
 pub fn section(options: &Options) -> Result<Section> {
     let pipeline = Pipeline::load(&campaign::place(options, 200, campaign::Weighed::None)?)?;
     let (_, chain) = frames::nominal_chain(&pipeline)?;
-    let model = frames::bare(&chain, frames::markers(&pipeline))?;
+    let model = frames::bare_model(&chain, frames::markers(&pipeline))?;
     let doubts = Doubts::of(&pipeline, &model, FeatureId::TIP);
     let mut section = Section::new("Clocks");
     section.say(

@@ -1,15 +1,15 @@
 //! `armcal add`: puts an effect into the model and shows what that does on points the fit never saw.
 
-use super::run::results;
-use super::{Outcome, may_write, print, style};
+use super::run::result_files;
+use super::{Outcome, may_write, print, terminal_style};
 use crate::error::Error;
-use crate::extended::{extend, set_of};
+use crate::extended::{extend_pipeline, set_of};
 use crate::progress::Progress;
 use crate::view::{self, Given};
 use armcal_config::Pipeline;
-use armcal_core::listed;
+use armcal_core::list_names;
 use armcal_diagnose::{Diagnosis, Nested};
-use armcal_held_out::{LeftOut, Transfer, transfers};
+use armcal_held_out::{LeftOut, Transfer, transfer_between_recordings};
 use armcal_model::EffectSpec;
 use armcal_pipeline::Converged;
 use armcal_recording::atomic;
@@ -59,18 +59,18 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let given = Given::alone(&request.pipeline)?;
     let path = given.pipeline;
     let pipeline = Pipeline::load(&path)?;
-    may_write(results(&pipeline, &request.out))?;
-    let named = named(&request.effects, &pipeline)?;
+    may_write(result_files(&pipeline, &request.out))?;
+    let named = parse_effects(&request.effects, &pipeline)?;
     if let Some(new) = &named {
-        extend(&pipeline, &path, request.write.as_deref(), (new, &[]))?;
+        extend_pipeline(&pipeline, &path, request.write.as_deref(), (new, &[]))?;
     }
     let progress = Progress::new();
     let settled = armcal_pipeline::settle_again(&pipeline, given.concluded, &progress)?;
     let geometry = settled.fitted.geometry.clone();
     let mut effects = frames::effect_specs(&pipeline, &geometry)?;
     let Chosen { new, sets, transfer, left_out, nested } =
-        chosen(named, &pipeline, &settled, &effects, &progress)?;
-    let extended = extend(&pipeline, &path, request.write.as_deref(), (&new, &sets))?;
+        select_effects(named, &pipeline, &settled, &effects, &progress)?;
+    let extended = extend_pipeline(&pipeline, &path, request.write.as_deref(), (&new, &sets))?;
 
     progress.step("calibrating without and with");
     effects.extend(new.iter().cloned());
@@ -82,7 +82,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     progress.step("writing results");
     atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
     write_all(&run, &recordings, &request.out, &extended.pipeline.output)?;
-    view::remember(&request.out, &extended.path, &[])?;
+    view::write_source_file(&request.out, &extended.path, &[])?;
     progress.finish();
 
     let added: Vec<String> = new.iter().map(EffectSpec::to_string).collect();
@@ -106,7 +106,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         print(&super::json_text(&super::with_losses(value))?)?;
     } else {
         let one_of = |name: &String| match set_of(name, &sets) {
-            Some(set) => format!("{name} (one of {}: these data do not tell which)", listed(set)),
+            Some(set) => format!("{name} (one of {}: these data do not tell which)", list_names(set)),
             None => name.clone(),
         };
         let added = run.in_words(&added.iter().map(one_of).collect::<Vec<_>>().join(", "));
@@ -114,14 +114,14 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         for LeftOut { effect, reason } in &left_out {
             print(&format!("Left out: {}: {reason}\n\n", run.in_words(effect)))?;
         }
-        print(&comparison_text(&comparison, style()))?;
+        print(&comparison_text(&comparison, terminal_style()))?;
         for transfer in &transfer {
             print(&format!("\nTransfer: {}.\n", run.in_words(&transfer.sentence())))?;
         }
         if let Some(nested) = &nested {
             print(&format!("\nThe choice: {}.\n", run.in_words(&nested_sentence(nested))))?;
         }
-        print(&format!("\n{}", diagnosis_text(&run, style())))?;
+        print(&format!("\n{}", diagnosis_text(&run, terminal_style())))?;
         let (path, out) = (extended.path.display(), request.out.display());
         print(&format!("\nPipeline with the effect: {path}; its results: {out}\n"))?;
     }
@@ -129,7 +129,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
 }
 
 /// The effects the user named; `None` for those that the diagnosis will suggest.
-fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>>, Error> {
+fn parse_effects(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>>, Error> {
     if words.iter().any(|word| word == SUGGESTED) {
         return Ok(None);
     }
@@ -140,7 +140,7 @@ fn named(words: &[String], pipeline: &Pipeline) -> Result<Option<Vec<EffectSpec>
 
 /// What is added: what the user names, or of what the diagnosis suggests that which another session and the other
 /// recordings do not contradict. `base` are the pipeline's own effects.
-fn chosen(
+fn select_effects(
     named: Option<Vec<EffectSpec>>,
     pipeline: &Pipeline,
     settled: &Converged,
@@ -148,7 +148,9 @@ fn chosen(
     progress: &Progress,
 ) -> Result<Chosen, Error> {
     let Fitted { geometry, observations, .. } = &settled.fitted;
-    let checked = |new: &[EffectSpec]| transfers(pipeline, geometry, (base, new), observations, progress);
+    let checked = |new: &[EffectSpec]| {
+        transfer_between_recordings(pipeline, geometry, (base, new), observations, progress)
+    };
     if let Some(new) = named {
         let transfer = checked(&new)?;
         return Ok(Chosen { new, sets: Vec::new(), transfer, left_out: Vec::new(), nested: None });

@@ -1,6 +1,6 @@
 //! `armcal batch`, `armcal map`, `armcal reduce`: a whole archive, on one machine or many.
 
-use super::{Outcome, may_write, print, style};
+use super::{Outcome, may_write, print, terminal_style};
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_archive::{Counter as _, Request, Shard, batch, completion_marker_file};
@@ -28,7 +28,11 @@ impl Job<'_> {
 
     /// Notes the recordings, so that no result is begun in the place of one.
     fn note_inputs(&self) {
-        self.manifest.entries.iter().flat_map(|entry| &entry.paths).for_each(|path| input::note(path));
+        self.manifest
+            .entries
+            .iter()
+            .flat_map(|entry| &entry.paths)
+            .for_each(|path| input::register_path(path));
     }
 
     fn request<'a>(&'a self, pipeline: &'a Pipeline) -> Request<'a> {
@@ -48,7 +52,7 @@ pub(crate) fn run(job: &Job<'_>, json: bool) -> Result<Outcome, Error> {
     if skipped > 0 {
         progress.say(&format!("{skipped} results were there already"));
     }
-    show(&campaign, job.out, &written, json)
+    print_campaign(&campaign, job.out, &written, json)
 }
 
 /// One share.
@@ -79,14 +83,19 @@ fn shard_of(shard: Option<&str>) -> Result<Shard, Error> {
 pub(crate) fn reduce(out: &Path, json: bool) -> Result<Outcome, Error> {
     may_write(campaign_files(out))?;
     let (campaign, written) = armcal_archive::reduce(out)?;
-    show(&campaign, out, &written, json)
+    print_campaign(&campaign, out, &written, json)
 }
 
-fn show(campaign: &Campaign, out: &Path, written: &[PathBuf], json: bool) -> Result<Outcome, Error> {
+fn print_campaign(
+    campaign: &Campaign,
+    out: &Path,
+    written: &[PathBuf],
+    json: bool,
+) -> Result<Outcome, Error> {
     if json {
         print(&campaign_json(campaign))?;
     } else {
-        print(&campaign_text(campaign, style()))?;
+        print(&campaign_text(campaign, terminal_style()))?;
         super::print_written(out, written)?;
     }
     Ok(if campaign.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })

@@ -1,13 +1,13 @@
 //! `armcal check`: whether a result keeps the limits in its pipeline's `[check]`.
 
-use super::run::results;
+use super::run::result_files;
 use super::{Outcome, may_write, print};
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::view::{self, Given};
 use armcal_check::{Judged, Judgement, Limits, SCHEMA, judge, junit, markdown, text};
 use armcal_config::Pipeline;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_recording::atomic;
 use armcal_report::write_all;
 use clap::Args;
@@ -41,10 +41,10 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let given = Given::alone(&request.pipeline);
     let loaded = given.and_then(|given| Ok((Pipeline::load(&given.pipeline)?, given)));
     may_write([&request.junit, &request.markdown].into_iter().flatten())?;
-    match loaded.and_then(|(pipeline, given)| judged(request, &pipeline, given)) {
+    match loaded.and_then(|(pipeline, given)| judge_pipeline(request, &pipeline, given)) {
         Ok(judged) => {
-            write(&request.junit, || Ok(junit::junit(&judged)?))?;
-            write(&request.markdown, || Ok(markdown::markdown(&judged)))?;
+            write_if_requested(&request.junit, || Ok(junit::junit(&judged)?))?;
+            write_if_requested(&request.markdown, || Ok(markdown::markdown(&judged)))?;
             print(&if request.json { super::json_text(&judged)? } else { text::text(&judged) })?;
             Ok(match judged.judgement {
                 Judgement::Holds => Outcome::Done,
@@ -59,9 +59,9 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     }
 }
 
-fn judged(request: &Request, pipeline: &Pipeline, given: Given) -> Result<Judged, Error> {
+fn judge_pipeline(request: &Request, pipeline: &Pipeline, given: Given) -> Result<Judged, Error> {
     let limits = Limits::of(pipeline, &given.pipeline)?;
-    may_write(request.out.as_deref().map(|out| results(pipeline, out)).into_iter().flatten())?;
+    may_write(request.out.as_deref().map(|out| result_files(pipeline, out)).into_iter().flatten())?;
     let progress = Progress::new();
     let settled = armcal_pipeline::settle_again(pipeline, given.concluded, &progress)?;
     let (mut run, recordings) = settled.diagnosed(pipeline, &progress);
@@ -70,7 +70,7 @@ fn judged(request: &Request, pipeline: &Pipeline, given: Given) -> Result<Judged
     if let Some(out) = &request.out {
         progress.step("writing results");
         write_all(&run, &recordings, out, &pipeline.output)?;
-        view::remember(out, &given.pipeline, &[])?;
+        view::write_source_file(out, &given.pipeline, &[])?;
     }
     progress.finish();
     Ok(judged)
@@ -80,9 +80,9 @@ fn judged(request: &Request, pipeline: &Pipeline, given: Given) -> Result<Judged
 fn report_failure(request: &Request, error: &Error) -> Result<(), Error> {
     let name = request.pipeline.file_stem().unwrap_or_default().to_string_lossy();
     let error = error.to_string();
-    write(&request.junit, || Ok(junit::junit_failed(&name, &error)?))?;
-    write(&request.markdown, || Ok(markdown::markdown_failed(&name, &error)))?;
-    let line = format!("{}: no check was made, the run failed", printable(&name));
+    write_if_requested(&request.junit, || Ok(junit::junit_failed(&name, &error)?))?;
+    write_if_requested(&request.markdown, || Ok(markdown::markdown_failed(&name, &error)))?;
+    let line = format!("{}: no check was made, the run failed", printable_name(&name));
     if request.json {
         let value = json!({ "schema": SCHEMA, "judgement": "failed", "line": line, "error": error });
         print(&super::json_text(&value)?)?;
@@ -92,7 +92,10 @@ fn report_failure(request: &Request, error: &Error) -> Result<(), Error> {
     Ok(())
 }
 
-fn write(path: &Option<PathBuf>, content: impl FnOnce() -> Result<String, Error>) -> Result<(), Error> {
+fn write_if_requested(
+    path: &Option<PathBuf>,
+    content: impl FnOnce() -> Result<String, Error>,
+) -> Result<(), Error> {
     let Some(path) = path else { return Ok(()) };
     atomic::write(path, content()?.as_bytes()).map_err(Error::Output)
 }

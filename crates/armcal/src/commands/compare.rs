@@ -1,6 +1,6 @@
 //! `armcal compare`: two results on the same dwells.
 
-use super::{Outcome, may_write, print, style};
+use super::{Outcome, may_write, print, terminal_style};
 use crate::error::Error;
 use armcal_recording::atomic;
 use armcal_report::{comparison_html, comparison_text};
@@ -13,7 +13,11 @@ pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Resu
     may_write(html)?;
     let comparison = Comparison::of(&before, &after);
     if comparison.all.is_none() {
-        return Err(Error::NothingInCommon { before: before.path, after: after.path, why: why(&comparison) });
+        return Err(Error::NothingInCommon {
+            before: before.path,
+            after: after.path,
+            why: unpaired_reasons(&comparison),
+        });
     }
     if let Some(path) = html {
         let page = comparison_html(&before, &after, &comparison)?;
@@ -22,13 +26,13 @@ pub fn run(before: &Path, after: &Path, html: Option<&Path>, json: bool) -> Resu
     if json {
         print(&super::json_text(&comparison)?)?;
     } else {
-        print(&comparison_text(&comparison, style()))?;
+        print(&comparison_text(&comparison, terminal_style()))?;
     }
     Ok(Outcome::Done)
 }
 
 /// Why no dwell of one result is in the other, recording by recording.
-fn why(comparison: &Comparison) -> String {
+fn unpaired_reasons(comparison: &Comparison) -> String {
     let reasons: Vec<String> = comparison.unpaired.iter().map(ToString::to_string).collect();
     reasons.join("; ")
 }

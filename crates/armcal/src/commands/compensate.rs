@@ -5,7 +5,9 @@ use crate::error::Error;
 use armcal_compensate::{Compensator, Drive, SetPoint, TargetFrame, resample};
 use armcal_core::{FeatureId, Load};
 use armcal_deploy::set_points::table::Sheet;
-use armcal_deploy::set_points::{in_world_m, placed, recording, recording_index, target_frame, targets};
+use armcal_deploy::set_points::{
+    in_world_m, place_targets, recording, recording_index, target_frame, targets,
+};
 use armcal_model::Model;
 use armcal_recording::atomic;
 use armcal_result::{StoredArms, StoredModel, open_model};
@@ -66,22 +68,22 @@ pub struct Request {
 pub fn run(request: &Request) -> Result<Outcome, Error> {
     let past = open_model(&request.result)?;
     let arms = past.arms()?;
-    let tip = tip(&arms.geometry, request.tip.as_deref())?;
+    let tip = select_tip(&arms.geometry, request.tip.as_deref())?;
     let frame = target_frame(&past, &request.frame)
-        .map_err(|problem| bad("--frame", request.frame.clone(), &problem))?;
+        .map_err(|problem| option_error("--frame", request.frame.clone(), &problem))?;
     let wanted = targets::read(&request.targets)?;
     may_write([Some(&request.out), request.mcap.as_ref()].into_iter().flatten())?;
-    let start = request.start.as_deref().map(|words| joints(words, &arms)).transpose()?;
-    let drive = drive(request, &past, &arms)?;
-    let held = held(&arms.geometry, tip, &drive, start.as_deref())?;
+    let start = request.start.as_deref().map(|words| parse_joint_positions(words, &arms)).transpose()?;
+    let drive = drive_from_request(request, &past, &arms)?;
+    let held = held_joints(&arms.geometry, tip, &drive, start.as_deref())?;
     let mut compensator = Compensator::of_result(&past, &arms, (tip, frame), &drive);
     for (joint, at_rad) in &held {
         compensator.limits.0[*joint] = [*at_rad; 2];
     }
-    let mut targets = placed(&arms, (tip, frame), &wanted)?;
+    let mut targets = place_targets(&arms, (tip, frame), &wanted)?;
     if let Some(rate_hz) = request.rate_hz {
         if !(rate_hz > 0.0 && rate_hz <= 1e4) {
-            return Err(bad("--rate", rate_hz.to_string(), "give points a second, up to 10000"));
+            return Err(option_error("--rate", rate_hz.to_string(), "give points a second, up to 10000"));
         }
         targets = resample(&targets, rate_hz)?;
     }
@@ -93,7 +95,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         chain,
         points: &points,
         in_world_m,
-        notes: notes(&past, &arms, (frame, held.as_slice()), &compensator.conditions),
+        notes: set_point_notes(&past, &arms, (frame, held.as_slice()), &compensator.conditions),
     };
     atomic::write(&request.out, &sheet.csv()?).map_err(Error::Output)?;
     if let Some(path) = &request.mcap {
@@ -104,7 +106,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     } else {
         print(&format!("{}\nWritten to {}\n", sheet.text(), request.out.display()))?;
     }
-    Ok(if past.missing.is_empty() && points.iter().all(settled) {
+    Ok(if past.missing.is_empty() && points.iter().all(is_converged) {
         Outcome::Done
     } else {
         Outcome::CompletedWithWarnings
@@ -112,7 +114,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
 }
 
 /// The tip that is meant: by its name, or by that of its arm.
-fn tip(model: &Model, asked: Option<&str>) -> Result<FeatureId, Error> {
+fn select_tip(model: &Model, asked: Option<&str>) -> Result<FeatureId, Error> {
     let arms = model.chain().arms();
     let called = |name: &str| match asked {
         Some(asked) => name == asked || name == format!("{asked}.tip"),
@@ -123,7 +125,7 @@ fn tip(model: &Model, asked: Option<&str>) -> Result<FeatureId, Error> {
     found.ok_or_else(|| {
         let names = model.features().map(|(_, name)| name.strip_suffix(".tip").unwrap_or(name));
         let names = names.collect::<Vec<_>>().join(", ");
-        bad(
+        option_error(
             "--tip",
             asked.unwrap_or("nothing").to_owned(),
             &format!("the tips and markers of this result are {names}; name one"),
@@ -133,13 +135,13 @@ fn tip(model: &Model, asked: Option<&str>) -> Result<FeatureId, Error> {
 
 /// The joints that stay where they are, and where [rad]: those off the way to the tip, and those that move another branch too,
 /// unless a range is given for them.
-fn held(
+fn held_joints(
     model: &Model,
     tip: FeatureId,
     drive: &Drive,
     start: Option<&[f64]>,
 ) -> Result<Vec<(usize, f64)>, Error> {
-    let held = armcal_compensate::held(model, tip, drive);
+    let held = armcal_compensate::held_joints(model, tip, drive);
     match (held.first(), start) {
         (None, _) => Ok(Vec::new()),
         (Some(_), Some(start)) => Ok(held.into_iter().map(|joint| (joint, start[joint])).collect()),
@@ -149,35 +151,42 @@ fn held(
                 "joints off the way to the tip, and those that it shares with another, such as {name}, stay where they are: say \
                  where, all joints in degrees"
             );
-            Err(bad("--from", "nothing".to_owned(), &problem))
+            Err(option_error("--from", "nothing".to_owned(), &problem))
         }
     }
 }
 
 /// Whether the model predicts the tip at a stop. On a path links wait while a gap is crossed.
-fn settled(point: &SetPoint) -> bool {
+fn is_converged(point: &SetPoint) -> bool {
     point.target.time_s.is_some() || point.reached.as_ref().is_none_or(|r| r.after_m < 1e-5)
 }
 
-fn drive(request: &Request, past: &StoredModel, arms: &StoredArms) -> Result<Drive, Error> {
+fn drive_from_request(request: &Request, past: &StoredModel, arms: &StoredArms) -> Result<Drive, Error> {
     if request.load_kg.is_some_and(|l| !(l.is_finite() && l >= 0.0)) {
-        return Err(bad("--load", format!("{:?}", request.load_kg), "give a mass in kg, zero or more"));
+        return Err(option_error(
+            "--load",
+            format!("{:?}", request.load_kg),
+            "give a mass in kg, zero or more",
+        ));
     }
     if !(0.0..=45.0).contains(&request.approach_deg) {
-        return Err(bad("--approach", request.approach_deg.to_string(), "give an angle from 0 to 45 deg"));
+        return Err(option_error(
+            "--approach",
+            request.approach_deg.to_string(),
+            "give an angle from 0 to 45 deg",
+        ));
     }
     if !(0.0..=10.0).contains(&request.crossing_s) {
-        return Err(bad("--crossing", request.crossing_s.to_string(), "give a time from 0 to 10 s"));
+        return Err(option_error("--crossing", request.crossing_s.to_string(), "give a time from 0 to 10 s"));
     }
     let names = arms.geometry.chain().joint_names();
     let range = |words: &String| {
         let problem = "write a joint's number or name and its range, such as 2=-75..20";
-        joint_range(words, names).ok_or_else(|| bad("--range", words.clone(), problem))
+        joint_range(words, names).ok_or_else(|| option_error("--range", words.clone(), problem))
     };
-    let recording = request
-        .recording
-        .as_deref()
-        .map(|name| recording_index(past, name).map_err(|problem| bad("--as-in", name.to_owned(), &problem)));
+    let recording = request.recording.as_deref().map(|name| {
+        recording_index(past, name).map_err(|problem| option_error("--as-in", name.to_owned(), &problem))
+    });
     Ok(Drive {
         recording: recording.transpose()?,
         load_kg: request.load_kg,
@@ -189,19 +198,23 @@ fn drive(request: &Request, past: &StoredModel, arms: &StoredArms) -> Result<Dri
 }
 
 /// `0, -30, 10` in display units as a joint vector, SI.
-fn joints(words: &str, arms: &StoredArms) -> Result<Vec<f64>, Error> {
+fn parse_joint_positions(words: &str, arms: &StoredArms) -> Result<Vec<f64>, Error> {
     let chain = arms.geometry.chain();
     let parsed: Option<Vec<f64>> = words.split(',').map(|word| word.trim().parse().ok()).collect();
     let expected = chain.joint_names().len();
     let parsed = parsed.filter(|all| all.len() == expected && all.iter().all(|q| q.is_finite()));
     let shown = parsed.ok_or_else(|| {
-        bad("--from", words.to_owned(), &format!("give {expected} joints in degrees, joined by commas"))
+        option_error(
+            "--from",
+            words.to_owned(),
+            &format!("give {expected} joints in degrees, joined by commas"),
+        )
     })?;
     Ok(shown.iter().enumerate().map(|(j, q)| chain.joint_unit(j).from_display(*q)).collect())
 }
 
 /// What holds for every set-point.
-fn notes(
+fn set_point_notes(
     past: &StoredModel,
     arms: &StoredArms,
     (frame, held): (TargetFrame, &[(usize, f64)]),
@@ -255,6 +268,6 @@ fn notes(
     notes
 }
 
-fn bad(option: &'static str, value: String, problem: &str) -> Error {
+fn option_error(option: &'static str, value: String, problem: &str) -> Error {
     Error::BadOption { option, value, problem: problem.to_owned() }
 }

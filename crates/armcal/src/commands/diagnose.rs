@@ -1,6 +1,6 @@
 //! `armcal diagnose`: where the model fails, what is missing, what to record next.
 
-use super::{Outcome, print, style};
+use super::{Outcome, print, terminal_style};
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
@@ -17,16 +17,23 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
             print(&super::json_text(&past.summary["diagnosis"])?)?;
         } else {
             let concluded = Conclusions::open(input)?;
-            print(
-                &concluded.map_or_else(|| stored_diagnosis(&past, style()), |c| concluded_text(&c, style())),
-            )?;
+            print(&concluded.map_or_else(
+                || stored_diagnosis(&past, terminal_style()),
+                |c| concluded_text(&c, terminal_style()),
+            ))?;
         }
         let lost = past.summary["status"] == Status::DataLost.word();
         if lost {
             let why = "recordings of this run lost data; its page and summary.json say which and what";
             let subject = input.display().to_string();
             let lost = Severity::DataLost;
-            crate::stdout::tell(&[Warning::new(lost, Stage::Recording, "recording-damaged", subject, why)]);
+            crate::stdout::print_warnings(&[Warning::new(
+                lost,
+                Stage::Recording,
+                "recording-damaged",
+                subject,
+                why,
+            )]);
         }
         return Ok(if lost { Outcome::CompletedWithWarnings } else { Outcome::Done });
     }
@@ -38,7 +45,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
         let summary: serde_json::Value = serde_json::from_str(&summary_json(&run)?).map_err(Error::Json)?;
         print(&super::json_text(&super::with_losses(summary["diagnosis"].clone()))?)?;
     } else {
-        print(&diagnosis_text(&run, style()))?;
+        print(&diagnosis_text(&run, terminal_style()))?;
     }
     Ok(if run.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }

@@ -10,23 +10,25 @@ use serde_json::{Value, json};
 /// Prints the catalogue, or everything about one entry.
 pub fn run(name: Option<&str>, json: bool) -> Result<Outcome, Error> {
     let text = match (name, json) {
-        (None, false) => overview(),
-        (None, true) => super::json_text(&catalogue().iter().map(|k| entry(k)).collect::<Vec<Value>>())?,
+        (None, false) => catalogue_text(),
+        (None, true) => {
+            super::json_text(&catalogue().iter().map(|k| effect_json(k)).collect::<Vec<Value>>())?
+        }
         (Some(name), json) => {
             let kind = EffectSpec::new(name).kind().map_err(Error::of_usage)?;
-            if json { super::json_text(&entry(kind))? } else { page(kind) }
+            if json { super::json_text(&effect_json(kind))? } else { effect_text(kind) }
         }
     };
     print(&text)?;
     Ok(Outcome::Done)
 }
 
-fn overview() -> String {
+fn catalogue_text() -> String {
     let mut table = plain_table();
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(100);
     table.set_header(["effect", "what it is"]);
     for kind in catalogue() {
-        table.add_row([spec(kind), kind.summary.to_owned()]);
+        table.add_row([spec_syntax(kind), kind.summary.to_owned()]);
     }
     format!(
         "{}\n`armcal effects NAME` explains one; JOINT is a number from 1 or a name; add @RECORDING or \
@@ -36,7 +38,7 @@ fn overview() -> String {
 }
 
 /// How it is written: `backlash:JOINT`, `periodic:JOINT,frequency=..`.
-fn spec(kind: &EffectKind) -> String {
+fn spec_syntax(kind: &EffectKind) -> String {
     let joint = match kind.target {
         Target::Joint => ":JOINT",
         Target::Marker => ":MARKER",
@@ -47,8 +49,8 @@ fn spec(kind: &EffectKind) -> String {
     format!("{}{joint}{shapes}", kind.name)
 }
 
-fn page(kind: &EffectKind) -> String {
-    let mut text = format!("{}\n{}\n", spec(kind), kind.summary);
+fn effect_text(kind: &EffectKind) -> String {
+    let mut text = format!("{}\n{}\n", spec_syntax(kind), kind.summary);
     if !kind.aliases.is_empty() {
         text.push_str(&format!("The same to the data: {}.\n", kind.aliases.join(", ")));
     }
@@ -58,7 +60,7 @@ fn page(kind: &EffectKind) -> String {
     format!("{text}\n{}\n", kind.docs().trim())
 }
 
-fn entry(kind: &EffectKind) -> Value {
+fn effect_json(kind: &EffectKind) -> Value {
     let shapes: Vec<Value> = kind
         .shapes
         .iter()
@@ -69,7 +71,7 @@ fn entry(kind: &EffectKind) -> Value {
         .collect();
     json!({
         "name": kind.name,
-        "spec": spec(kind),
+        "spec": spec_syntax(kind),
         "summary": kind.summary,
         "same_to_the_data": kind.aliases,
         "confused_with": kind.confused_with,

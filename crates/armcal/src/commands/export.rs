@@ -19,7 +19,7 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
     let progress = Progress::new();
     let (run, _) = armcal_pipeline::settle(&pipeline, &progress)?.diagnosed(&pipeline, &progress);
     progress.finish();
-    let text = format!("{:#}\n", super::with_losses(problem(&run)));
+    let text = format!("{:#}\n", super::with_losses(problem_json(&run)));
     atomic::write(out, text.as_bytes()).map_err(Error::Output)?;
     print(&format!("{}\n", out.display()))?;
     Ok(Outcome::Done)
@@ -27,7 +27,7 @@ pub fn run(pipeline: &Path, out: &Path) -> Result<Outcome, Error> {
 
 /// Everything a solver needs that does not share armcal's code: the nominal arm, the observations with the
 /// covariances that whiten their residuals, the parameters with bounds and priors, and which of them the fit saw.
-fn problem(run: &Run) -> Value {
+fn problem_json(run: &Run) -> Value {
     let model = &run.model;
     let fit = &run.calibration.fit;
     // Held out in turn, every observation takes part in the fit whose parameters are written.
@@ -35,12 +35,12 @@ fn problem(run: &Run) -> Value {
     let rows = run.observations.iter().zip(&run.calibration.residuals);
     let observations: Vec<Value> = rows
         .map(|(o, residual)| {
-            let mut row = observation(o);
+            let mut row = observation_json(o);
             if let Some(marker) = model.marker_name(o.feature) {
                 row["feature"] = json!(marker);
             }
             row["covariance_m2"] =
-                json!(square(&position_covariance_m2(model, &run.calibration.nominal_values, o)));
+                json!(matrix_rows(&position_covariance_m2(model, &run.calibration.nominal_values, o)));
             row["in_fit"] = json!(!residual.held_out || in_turn);
             row
         })
@@ -50,16 +50,16 @@ fn problem(run: &Run) -> Value {
         "pipeline": run.pipeline_name,
         "model": run.model_texts[0],
         "sigma_scale": fit.sigma_scale,
-        "parameters": model.parameters().iter().zip(fit.values()).map(parameter).collect::<Vec<Value>>(),
-        "frames": frames(run),
+        "parameters": model.parameters().iter().zip(fit.values()).map(parameter_json).collect::<Vec<Value>>(),
+        "frames": frames_json(run),
         "board_names": run.recordings.iter().map(|r| format!("board.{}", r.name)).collect::<Vec<String>>(),
         "observations": observations,
     })
 }
 
-fn frames(run: &Run) -> Value {
+fn frames_json(run: &Run) -> Value {
     let nominal = run.model.nominal();
-    let matrix = |pose: Pose| json!(square(&pose.to_homogeneous()));
+    let matrix = |pose: Pose| json!(matrix_rows(&pose.to_homogeneous()));
     let boards: Vec<Value> =
         (0..run.recordings.len()).filter_map(|r| run.model.board_in_world(&nominal, r)).map(matrix).collect();
     json!({
@@ -70,11 +70,11 @@ fn frames(run: &Run) -> Value {
 }
 
 /// A square matrix as rows.
-fn square<const N: usize>(m: &SMatrix<f64, N, N>) -> Vec<Vec<f64>> {
+fn matrix_rows<const N: usize>(m: &SMatrix<f64, N, N>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-fn parameter((p, value): (&Parameter, f64)) -> Value {
+fn parameter_json((p, value): (&Parameter, f64)) -> Value {
     let finite = |x: f64| if x.is_finite() { json!(x) } else { Value::Null };
     json!({
         "name": p.name, "unit": p.unit.symbol(), "nominal": p.nominal, "lower": finite(p.lower),
@@ -82,7 +82,7 @@ fn parameter((p, value): (&Parameter, f64)) -> Value {
     })
 }
 
-fn observation(o: &Observation) -> Value {
+fn observation_json(o: &Observation) -> Value {
     let reference = match &o.reference {
         Reference::Seated { cavity, in_board_m } => {
             json!({"cavity": cavity, "in_board_m": in_board_m.as_slice()})

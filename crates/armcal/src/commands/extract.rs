@@ -4,7 +4,7 @@ use super::{Outcome, json_text, print};
 use crate::error::Error;
 use armcal_config::Pipeline;
 use armcal_core::Severity;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_recording::{
     Extract, Extracted, Recording, RecordingError, RecordingReport, extract, files_of, input,
 };
@@ -41,7 +41,7 @@ pub fn run(asked: &Request) -> Result<Outcome, Error> {
     let mut topics = asked.pipeline.as_deref().map_or(Ok(Vec::new()), topics_of)?;
     topics.extend_from_slice(&asked.topics);
     let name = asked.inputs.first().map(|p| p.display().to_string()).unwrap_or_default();
-    files_of(&asked.inputs).iter().for_each(|path| input::note(path));
+    files_of(&asked.inputs).iter().for_each(|path| input::register_path(path));
     super::may_write([&asked.out])?;
     let recording = Recording::open(&asked.inputs)
         .map_err(|source| RunError::Recording { recording: name.clone(), source })?;
@@ -54,7 +54,11 @@ pub fn run(asked: &Request) -> Result<Outcome, Error> {
         }
         source => RunError::Recording { recording: name, source }.into(),
     })?;
-    print(&if asked.json { json(&extracted, report)? } else { text(&asked.out, &extracted, report) })?;
+    print(&if asked.json {
+        extraction_json(&extracted, report)?
+    } else {
+        extraction_text(&asked.out, &extracted, report)
+    })?;
     let lost = report.warnings.iter().any(|w| w.severity >= Severity::Inadequate);
     Ok(if lost { Outcome::CompletedWithWarnings } else { Outcome::Done })
 }
@@ -65,7 +69,7 @@ fn topics_of(path: &Path) -> Result<Vec<String>, Error> {
     Ok(Pipeline::load(path)?.streams.topics().into_iter().map(literal).collect())
 }
 
-fn text(out: &Path, extracted: &Extracted, report: &RecordingReport) -> String {
+fn extraction_text(out: &Path, extracted: &Extracted, report: &RecordingReport) -> String {
     let bytes: u64 = report.files.iter().map(|f| f.bytes).sum();
     let size = std::fs::metadata(out).map(|about| about.len()).unwrap_or(0);
     let mut text = format!("{}: {:.2} of {:.2} MB", out.display(), size as f64 / 1e6, bytes as f64 / 1e6);
@@ -74,7 +78,7 @@ fn text(out: &Path, extracted: &Extracted, report: &RecordingReport) -> String {
     }
     text.push('\n');
     for (topic, messages) in &extracted.topics {
-        let _ = writeln!(text, "  {}: {messages} messages", printable(topic));
+        let _ = writeln!(text, "  {}: {messages} messages", printable_name(topic));
     }
     if extracted.attachments > 0 {
         let _ = writeln!(text, "  {} attachments", extracted.attachments);
@@ -85,7 +89,7 @@ fn text(out: &Path, extracted: &Extracted, report: &RecordingReport) -> String {
     text
 }
 
-fn json(extracted: &Extracted, report: &RecordingReport) -> Result<String, Error> {
+fn extraction_json(extracted: &Extracted, report: &RecordingReport) -> Result<String, Error> {
     let topics: Vec<_> = extracted
         .topics
         .iter()

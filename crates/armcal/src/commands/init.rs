@@ -3,9 +3,9 @@
 use super::{Outcome, json_text, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_init::{Asked, Proposal, Told, propose};
-use armcal_recording::{Over, RecordingError, atomic, holds, input, may_put, may_write_over};
+use armcal_recording::{Over, RecordingError, atomic, file_has_content, input, may_put, may_write_over};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -54,9 +54,9 @@ pub struct Request {
 /// Proposes, writes, and says what was seen and what was not.
 pub fn run(request: &Request) -> Result<Outcome, Error> {
     let given = [&request.urdf, &request.dh, &request.board];
-    given.into_iter().flatten().chain(&request.points).for_each(|path| input::note(path));
-    request.inputs.iter().for_each(|path| input::note(Path::new(path)));
-    free(&request.out, request.force)?;
+    given.into_iter().flatten().chain(&request.points).for_each(|path| input::register_path(path));
+    request.inputs.iter().for_each(|path| input::register_path(Path::new(path)));
+    check_replaceable(&request.out, request.force)?;
     let told = Told {
         dh: request.dh.clone(),
         urdf: request.urdf.clone(),
@@ -75,22 +75,26 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let proposal = propose(&asked, &progress)?;
     progress.finish();
     // What is there already, word for word, stays: a robot's description has no mark of armcal's.
-    let is_new = |(path, text): &&(PathBuf, String)| !holds(path, text.as_bytes());
+    let is_new = |(path, text): &&(PathBuf, String)| !file_has_content(path, text.as_bytes());
     let beside: Vec<&(PathBuf, String)> = proposal.beside.iter().filter(is_new).collect();
     for (path, text) in &beside {
-        free(path, request.force || may_put(path, text.as_bytes()).is_ok() && path.is_file())?;
+        check_replaceable(path, request.force || may_put(path, text.as_bytes()).is_ok() && path.is_file())?;
     }
     let over = if request.force { Over::Changed } else { Over::Unchanged };
     let pipeline = (proposal.out.clone(), proposal.pipeline.text.clone());
     for (path, text) in beside.into_iter().chain([&pipeline]) {
         atomic::write_over(path, text.as_bytes(), over).map_err(Error::Output)?;
     }
-    print(&if request.json { json_text(&super::with_losses(json_of(&proposal)))? } else { text(&proposal) })?;
+    print(&if request.json {
+        json_text(&super::with_losses(json_of(&proposal)))?
+    } else {
+        proposal_text(&proposal)
+    })?;
     Ok(if proposal.runs() { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }
 
 /// Whether a file may be written: it is not there, or the user wants it replaced and it is one of armcal's.
-fn free(path: &Path, force: bool) -> Result<(), Error> {
+fn check_replaceable(path: &Path, force: bool) -> Result<(), Error> {
     may_write_over(path, Over::Changed).map_err(Error::Output)?;
     let is_there = path.symlink_metadata().is_ok_and(|about| about.len() > 0);
     if !is_there || force {
@@ -105,25 +109,25 @@ fn free(path: &Path, force: bool) -> Result<(), Error> {
     Err(Error::Output(RecordingError::NotOurs { path: path.to_owned(), what: what.to_owned() }))
 }
 
-fn text(proposal: &Proposal) -> String {
+fn proposal_text(proposal: &Proposal) -> String {
     let mut out = String::new();
     for (body, cast) in &proposal.bodies {
         let sure = if cast.sure { "" } else { " (unsure)" };
         let _ = writeln!(
             out,
             " {}: {}{sure}: {}",
-            printable(&body.shown()),
+            printable_name(&body.shown()),
             cast.role.word(),
-            printable(&cast.why)
+            printable_name(&cast.why)
         );
     }
     for (what, all) in [("Unsure", &proposal.unsure), ("Not visible", &proposal.unseen)] {
         for said in all {
-            let _ = writeln!(out, " {what}: {}", printable(said));
+            let _ = writeln!(out, " {what}: {}", printable_name(said));
         }
     }
     for (topic, why) in &proposal.left {
-        let _ = writeln!(out, " Not used: {}: {}", printable(topic), printable(why));
+        let _ = writeln!(out, " Not used: {}: {}", printable_name(topic), printable_name(why));
     }
     match &proposal.tried {
         Some(Ok(tried)) => {
@@ -134,11 +138,11 @@ fn text(proposal: &Proposal) -> String {
                 tried.points
             );
             for mistake in &tried.mistakes {
-                let _ = writeln!(out, " Setup first: {}.", printable(mistake));
+                let _ = writeln!(out, " Setup first: {}.", printable_name(mistake));
             }
         }
         Some(Err(why)) => {
-            let _ = writeln!(out, "\n Tried, and it does not run yet: {}", printable(why));
+            let _ = writeln!(out, "\n Tried, and it does not run yet: {}", printable_name(why));
         }
         None => {}
     }

@@ -4,7 +4,7 @@ use super::{Outcome, print};
 use crate::error::Error;
 use armcal_config::{Pipeline, recording_name};
 use armcal_core::Severity;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_recording::{ChannelReport, FileReport, Recording, RecordingReport, StreamReport, shortened};
 use armcal_report::RULED;
 use armcal_stages::{RunError, Silent, preprocess};
@@ -30,7 +30,7 @@ pub fn run(inputs: &[PathBuf], json: bool) -> Result<Outcome, Error> {
         crate::stdout::print_json(&named)?;
     } else {
         for (name, report) in &reports {
-            print(&text(name, report))?;
+            print(&report_text(name, report))?;
         }
     }
     let empty = |(_, report): &&(String, RecordingReport)| {
@@ -70,24 +70,24 @@ fn of_pipeline(path: &Path) -> Result<Vec<(String, RecordingReport)>, Error> {
         .collect()
 }
 
-fn text(name: &str, report: &RecordingReport) -> String {
+fn report_text(name: &str, report: &RecordingReport) -> String {
     let mut out = format!("Recording {name}\n");
     for file in &report.files {
         let _ = writeln!(out, "  {}", file_line(file));
     }
-    let _ = writeln!(out, "{}", channels(&report.channels));
+    let _ = writeln!(out, "{}", channel_table(&report.channels));
     if let Some(more) = report.channels.len().checked_sub(SHOWN).filter(|more| *more > 0) {
         let _ = writeln!(out, "  and {more} more channels; --json lists them");
     }
     if !report.streams.is_empty() {
-        let _ = writeln!(out, "{}", streams(&report.streams));
+        let _ = writeln!(out, "{}", stream_table(&report.streams));
         for stream in &report.streams {
             let _ =
                 writeln!(out, "  {}: {} clock, {}", stream.role, stream.clock.word(), stream.clock_reason);
         }
     }
     for warning in &report.warnings {
-        let _ = writeln!(out, "  warning: {}", printable(&warning.to_string()));
+        let _ = writeln!(out, "  warning: {}", printable_name(&warning.to_string()));
     }
     out.push('\n');
     out
@@ -114,12 +114,12 @@ fn file_line(file: &FileReport) -> String {
         let _ = write!(line, ", cut off at byte {byte}");
     }
     for (offset, reason) in &file.damaged {
-        let _ = write!(line, "\n    damaged at byte {offset}: {}", printable(reason));
+        let _ = write!(line, "\n    damaged at byte {offset}: {}", printable_name(reason));
     }
     line
 }
 
-fn channels(channels: &[ChannelReport]) -> Table {
+fn channel_table(channels: &[ChannelReport]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED);
     table.set_header(["topic", "schema", "encoding", "messages", "Hz", "from [s]", "for [s]", "read as"]);
@@ -128,23 +128,23 @@ fn channels(channels: &[ChannelReport]) -> Table {
         let duration_s = (c.last_ns - c.first_ns) as f64 * 1e-9;
         let rate_hz = if duration_s > 0.0 { (c.messages.saturating_sub(1)) as f64 / duration_s } else { 0.0 };
         table.add_row([
-            printable(&shortened(&c.topic)),
-            printable(&shortened(&c.schema)),
-            printable(&shortened(&format!("{}/{}", c.schema_encoding, c.message_encoding))),
+            printable_name(&shortened(&c.topic)),
+            printable_name(&shortened(&c.schema)),
+            printable_name(&shortened(&format!("{}/{}", c.schema_encoding, c.message_encoding))),
             c.messages.to_string(),
             format!("{rate_hz:.1}"),
             format!("{:.2}", (c.first_ns - start_ns) as f64 * 1e-9),
             format!("{duration_s:.2}"),
             match &c.decodable {
                 Ok(role) => (*role).to_owned(),
-                Err(why) => format!("no: {}", printable(&shortened(why))),
+                Err(why) => format!("no: {}", printable_name(&shortened(why))),
             },
         ]);
     }
     table
 }
 
-fn streams(streams: &[StreamReport]) -> Table {
+fn stream_table(streams: &[StreamReport]) -> Table {
     let mut table = Table::new();
     table.load_style(RULED);
     table.set_header([
@@ -162,7 +162,7 @@ fn streams(streams: &[StreamReport]) -> Table {
     for s in streams {
         table.add_row([
             s.role.clone(),
-            printable(&shortened(&s.topic)),
+            printable_name(&shortened(&s.topic)),
             format!("{}/{}", s.rows, s.messages),
             format!("{:.1}", s.rate_hz),
             format!("{:.3}", s.largest_gap_s),

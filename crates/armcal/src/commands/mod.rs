@@ -23,8 +23,8 @@ pub(crate) mod view;
 pub mod write;
 
 use crate::error::Error;
-use crate::stdout::{print, style};
-use armcal_recording::losses;
+use crate::stdout::{print, terminal_style};
+use armcal_recording::data_loss_warnings;
 use std::path::{Path, PathBuf};
 
 /// How a command ended when it did not fail.
@@ -40,7 +40,7 @@ pub enum Outcome {
 
 /// What recordings lost, in the JSON of a result, where anything was.
 fn with_losses(mut value: serde_json::Value) -> serde_json::Value {
-    let lost = losses();
+    let lost = data_loss_warnings();
     if let (Some(object), false) = (value.as_object_mut(), lost.is_empty()) {
         object.insert("data_lost".to_owned(), serde_json::json!(lost));
     }

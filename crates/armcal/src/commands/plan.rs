@@ -9,8 +9,11 @@ use armcal_config::Pipeline;
 use armcal_core::Arrival;
 use armcal_model::{EffectSpec, Model};
 use armcal_pipeline::Converged;
-use armcal_plan::{Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, named, propose, standing};
-use armcal_report::{number, plain_table, table_text};
+use armcal_plan::{
+    Allowed, Known, Place, Proposal, Proposed, Standing, Tracking, propose, rivals_from_diagnosis,
+    rivals_from_names,
+};
+use armcal_report::{number_cell, plain_table, table_text};
 use armcal_stages::{Fitted, frames};
 use clap::Args;
 use comfy_table::Cell;
@@ -52,8 +55,8 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let pipeline = Pipeline::load(&given.pipeline)?;
     let (_, chain) = frames::nominal_chain(&pipeline)?;
     let joints = chain.joint_names();
-    let allowed = allowed(request, joints)?;
-    let words = request.effects.as_deref().map(split);
+    let allowed = allowed_from_request(request, joints)?;
+    let words = request.effects.as_deref().map(split_effects);
     for word in words.iter().flatten() {
         EffectSpec::parse(word, joints).map_err(Error::of_usage)?;
     }
@@ -61,8 +64,8 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let settled = armcal_pipeline::settle_again(&pipeline, given.concluded, &progress)?;
     let diagnosis = settled.diagnose_and_refit(&pipeline, &progress)?;
     let open = match (&words, &diagnosis) {
-        (Some(words), _) => named(words, diagnosis.as_ref(), joints)?,
-        (None, Some(diagnosis)) => standing(diagnosis, joints)?,
+        (Some(words), _) => rivals_from_names(words, diagnosis.as_ref(), joints)?,
+        (None, Some(diagnosis)) => rivals_from_diagnosis(diagnosis, joints)?,
         (None, None) => return Err(Error::NotDiagnosed),
     };
     progress.step("weighing what could be recorded");
@@ -74,7 +77,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
         session: &settled.fitted.session,
         fit: &pipeline.fit,
         board: settled.inputs.board.as_ref().filter(|_| pipeline.observations.seated),
-        tracked: tracking(&pipeline, &settled),
+        tracked: tracking_noise(&pipeline, &settled),
         recordings: settled.inputs.seen.iter().map(|s| s.name.clone()).collect(),
     };
     let proposal = propose(&known, &open, &allowed, &pipeline.diagnosis)?;
@@ -82,13 +85,13 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     print(&if request.json {
         super::json_text(&super::with_losses(serde_json::to_value(&proposal).map_err(Error::Json)?))?
     } else {
-        text(&proposal, joints)
+        proposal_text(&proposal, joints)
     })?;
     Ok(Outcome::Done)
 }
 
 /// Commas between effects; a part such as `frequency=30` belongs to the effect before it.
-fn split(words: &str) -> Vec<String> {
+fn split_effects(words: &str) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for part in words.split(',').map(str::trim).filter(|part| !part.is_empty()) {
         match all.last_mut() {
@@ -99,7 +102,7 @@ fn split(words: &str) -> Vec<String> {
     all
 }
 
-fn allowed(request: &Request, joints: &[String]) -> Result<Allowed, Error> {
+fn allowed_from_request(request: &Request, joints: &[String]) -> Result<Allowed, Error> {
     let bad = |option, value: String, problem: &str| {
         Err(Error::BadOption { option, value, problem: problem.to_owned() })
     };
@@ -139,7 +142,7 @@ fn with_certain(
 }
 
 /// How well the sensor saw the tip in the dwells of these recordings (their median).
-fn tracking(pipeline: &Pipeline, settled: &Converged) -> Option<Tracking> {
+fn tracking_noise(pipeline: &Pipeline, settled: &Converged) -> Option<Tracking> {
     if !pipeline.tip_is_tracked() || !pipeline.observations.tracked {
         return None;
     }
@@ -162,14 +165,14 @@ fn tracking(pipeline: &Pipeline, settled: &Converged) -> Option<Tracking> {
     })
 }
 
-fn text(proposal: &Proposal, joints: &[String]) -> String {
+fn proposal_text(proposal: &Proposal, joints: &[String]) -> String {
     let mut text = format!("To tell apart: {}\n({})\n\n", proposal.explanations.join(", "), proposal.why);
     if !proposal.dwells.is_empty() {
-        text.push_str(&dwells(proposal, joints));
+        text.push_str(&dwell_table(proposal, joints));
         text.push('\n');
     }
-    text.push_str(&pairs(proposal));
-    text.push_str(&format!("\n{}.\n", capital(&proposal.sentence)));
+    text.push_str(&pair_table(proposal));
+    text.push_str(&format!("\n{}.\n", capitalise_first(&proposal.sentence)));
     let ranges = proposal.range_deg.iter().zip(joints);
     let ranges: Vec<String> =
         ranges.map(|([low, high], name)| format!("{name} {low:.0}..{high:.0}")).collect();
@@ -180,38 +183,38 @@ fn text(proposal: &Proposal, joints: &[String]) -> String {
     text
 }
 
-fn dwells(proposal: &Proposal, joints: &[String]) -> String {
+fn dwell_table(proposal: &Proposal, joints: &[String]) -> String {
     let mut table = plain_table();
     let mut header = vec!["".to_owned(), "where".to_owned()];
     header.extend(joints.iter().map(|name| format!("{name} [deg]")));
     header.extend(["arrive", "load [kg]", "Delta"].map(str::to_owned));
     table.set_header(header);
     for (i, dwell) in proposal.dwells.iter().enumerate() {
-        let mut cells = vec![number(format!("{}", i + 1)), Cell::new(place(dwell))];
-        cells.extend(dwell.joint_deg.iter().map(|q| number(format!("{q:.1}"))));
+        let mut cells = vec![number_cell(format!("{}", i + 1)), Cell::new(place_text(dwell))];
+        cells.extend(dwell.joint_deg.iter().map(|q| number_cell(format!("{q:.1}"))));
         cells.push(Cell::new(dwell.arrival.iter().map(Arrival::symbol).collect::<String>()));
-        cells.push(number(format!("{}", dwell.load_kg)));
-        cells.push(number(format!("{:.1}", dwell.delta)));
+        cells.push(number_cell(format!("{}", dwell.load_kg)));
+        cells.push(number_cell(format!("{:.1}", dwell.delta)));
         table.add_row(cells);
     }
     table_text(&table)
 }
 
-fn pairs(proposal: &Proposal) -> String {
+fn pair_table(proposal: &Proposal) -> String {
     let mut table = plain_table();
     table.set_header(["pair", "Delta now", "then", "motion or sensor"]);
     for pair in &proposal.pairs {
         table.add_row([
             Cell::new(pair.names.join(" or ")),
-            number(format!("{:.1}", pair.delta_before)),
-            number(format!("{:.1}", pair.delta_after)),
+            number_cell(format!("{:.1}", pair.delta_before)),
+            number_cell(format!("{:.1}", pair.delta_after)),
             Cell::new(pair.sensor.as_deref().unwrap_or("these dwells")),
         ]);
     }
     table_text(&table)
 }
 
-fn place(dwell: &Proposed) -> String {
+fn place_text(dwell: &Proposed) -> String {
     match &dwell.place {
         Place::Cavity { cavity, recording, slide_from_deg } => {
             let way =
@@ -224,7 +227,7 @@ fn place(dwell: &Proposed) -> String {
     }
 }
 
-fn capital(sentence: &str) -> String {
+fn capitalise_first(sentence: &str) -> String {
     let mut letters = sentence.chars();
     letters
         .next()
@@ -234,10 +237,13 @@ fn capital(sentence: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::split;
+    use super::split_effects;
 
     #[test]
     fn a_shape_stays_with_its_effect() {
-        assert_eq!(split("backlash:1, periodic:2,frequency=30"), ["backlash:1", "periodic:2,frequency=30"]);
+        assert_eq!(
+            split_effects("backlash:1, periodic:2,frequency=30"),
+            ["backlash:1", "periodic:2,frequency=30"]
+        );
     }
 }

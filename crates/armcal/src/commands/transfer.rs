@@ -4,20 +4,20 @@ use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_calibrate::HeldOut;
-use armcal_held_out::{Asked, SessionTransfer, between};
-use armcal_report::{number, plain_table, table_text};
+use armcal_held_out::{Asked, SessionTransfer, transfer_between_sessions};
+use armcal_report::{number_cell, plain_table, table_text};
 use comfy_table::Cell;
 
 /// Judges one session's calibration in the other and prints what became of it.
 pub fn run(asked: &Asked<'_>, json: bool) -> Result<Outcome, Error> {
     let progress = Progress::new();
-    let transfer = between(asked, &progress)?;
+    let transfer = transfer_between_sessions(asked, &progress)?;
     progress.finish();
-    print(&if json { super::json_text(&transfer)? } else { text(&transfer) })?;
+    print(&if json { super::json_text(&transfer)? } else { transfer_text(&transfer) })?;
     Ok(if transfer.harms() { Outcome::CompletedWithWarnings } else { Outcome::Done })
 }
 
-fn text(transfer: &SessionTransfer) -> String {
+fn transfer_text(transfer: &SessionTransfer) -> String {
     let SessionTransfer { from, to, calibration, together, effects, .. } = transfer;
     let mut table = plain_table();
     let header =
@@ -27,9 +27,9 @@ fn text(transfer: &SessionTransfer) -> String {
         let [low, high] = h.change_ci95;
         table.add_row([
             Cell::new(what),
-            number(format!("{:.3}", h.before)),
-            number(format!("{:.3}", h.after)),
-            number(format!("{low:+.3} to {high:+.3}")),
+            number_cell(format!("{:.3}", h.before)),
+            number_cell(format!("{:.3}", h.after)),
+            number_cell(format!("{low:+.3} to {high:+.3}")),
             Cell::new(h.verdict()),
         ]);
     };

@@ -1,6 +1,6 @@
 //! `armcal verify`: a calibrated model on recordings it never saw.
 
-use super::{Outcome, may_write, print, style};
+use super::{Outcome, may_write, print, terminal_style};
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
@@ -28,7 +28,7 @@ pub fn run(result: &Path, pipeline: &Path, out: Option<&Path>, json: bool) -> Re
     if json {
         print(&verification_json(&verification))?;
     } else {
-        print(&verification_text(&verification, style()))?;
+        print(&verification_text(&verification, terminal_style()))?;
     }
     Ok(if verification.status() == Status::Ok { Outcome::Done } else { Outcome::CompletedWithWarnings })
 }

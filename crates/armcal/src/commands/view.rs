@@ -22,7 +22,7 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
             input.display()
         ))?;
     }
-    crate::stdout::tell(&armcal_recording::losses());
+    crate::stdout::print_warnings(&armcal_recording::data_loss_warnings());
     serve(session, port, |address| {
         print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display()))
     })?;

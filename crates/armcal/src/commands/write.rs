@@ -4,10 +4,10 @@ use super::{Outcome, may_write, print};
 use crate::error::Error;
 use armcal_config::read_text;
 use armcal_core::ErrorStats;
-use armcal_core::printable;
-use armcal_core::units::millimetres;
-use armcal_deploy::write::left::{Recorded, left};
-use armcal_deploy::write::{Made, Source, made};
+use armcal_core::printable_name;
+use armcal_core::units::format_mm;
+use armcal_deploy::write::left::{Recorded, remaining_errors};
+use armcal_deploy::write::{Made, Source, make_file};
 use armcal_formats::Format;
 use armcal_recording::atomic;
 use armcal_recording::input::Kind;
@@ -50,13 +50,13 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
     let format = request.format;
     let past = open_model(&request.result)?;
     let arms = past.arms()?;
-    let source = Source::of(&past, &arms, arm(&arms, request.arm.as_deref())?);
+    let source = Source::of(&past, &arms, select_arm(&arms, request.arm.as_deref())?);
     let hash_from = hash_from(format, request.hash_from.as_deref())?;
     let recorded = Recorded::beside(&request.result, &past)?;
     let out = request.out.clone().unwrap_or_else(|| format.file_name().into());
     may_write([&out])?;
-    let made = made(&source, format, hash_from.as_deref(), &recorded)?;
-    let left = left(&source, &recorded, made.zeros.as_ref());
+    let made = make_file(&source, format, hash_from.as_deref(), &recorded)?;
+    let left = remaining_errors(&source, &recorded, made.zeros.as_ref());
     atomic::write(&out, &made.text).map_err(Error::Output)?;
     let said = Said { format, made: &made, left, over: recorded.what, past: &past };
     if request.json {
@@ -68,7 +68,7 @@ pub fn run(request: &Request) -> Result<Outcome, Error> {
 }
 
 /// The arm that is meant, of several by its name.
-fn arm(arms: &StoredArms, asked: Option<&str>) -> Result<usize, Error> {
+fn select_arm(arms: &StoredArms, asked: Option<&str>) -> Result<usize, Error> {
     let names: Vec<&str> = arms.model.chain().arms().iter().map(|arm| arm.name.as_str()).collect();
     let bad = |problem: String| Error::BadOption {
         option: "--arm",
@@ -119,7 +119,7 @@ impl Said<'_> {
     fn text(&self, name: &str) -> String {
         let Said { format, made, .. } = self;
         let lacks: Vec<String> = made.by_hand.iter().chain(&made.lacks).cloned().collect();
-        let mut text = format!("\"{}\" as {format}, for {}\n", printable(name), format.readers());
+        let mut text = format!("\"{}\" as {format}, for {}\n", printable_name(name), format.readers());
         let leaves = self.leaves();
         for (title, lines) in [
             ("in it", &made.holds),
@@ -139,7 +139,7 @@ impl Said<'_> {
     /// How far off the file is, and the model.
     fn leaves(&self) -> Vec<String> {
         let Said { made, left, past, over, .. } = self;
-        let [mean, p95, most] = [left.mean_m, left.p95_m, left.max_m].map(millimetres);
+        let [mean, p95, most] = [left.mean_m, left.p95_m, left.max_m].map(format_mm);
         let entered = if made.by_hand.is_some() { ", with the tip entered as above" } else { "" };
         let mut lines = vec![match (left.n, left.max_m < NOTHING_M) {
             (0, _) => format!("nothing is known of it: there are no {over}"),
@@ -151,7 +151,7 @@ impl Said<'_> {
         }];
         lines.extend(
             past.mean_error_m
-                .map(|m| format!("the model's own mean error where it was tested is {} mm", millimetres(m))),
+                .map(|m| format!("the model's own mean error where it was tested is {} mm", format_mm(m))),
         );
         if !past.missing.is_empty() {
             lines.push(format!(

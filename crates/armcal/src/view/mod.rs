@@ -16,4 +16,4 @@ mod turns;
 pub use server::serve;
 pub use session::RefitSession;
 pub(crate) use source::FILE as SOURCE_FILE;
-pub use source::{Given, remember};
+pub use source::{Given, write_source_file};

@@ -34,7 +34,7 @@ pub fn serve(
     listener.set_nonblocking(true).map_err(failed("listening"))?;
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
-    let app = routes(Arc::new(Served { session, turns: Turns::new() }), guard);
+    let app = build_router(Arc::new(Served { session, turns: Turns::new() }), guard);
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     // A thread each for the one that is computed and those that are written.
     let runtime =
@@ -52,7 +52,7 @@ struct Served {
     turns: Turns,
 }
 
-fn routes(served: Arc<Served>, guard: Guard) -> Router {
+fn build_router(served: Arc<Served>, guard: Guard) -> Router {
     let own = Router::new()
         .route("/", get(page))
         .route("/choices", get(choices))
@@ -67,7 +67,7 @@ fn routes(served: Arc<Served>, guard: Guard) -> Router {
 
 async fn guarded(State(guard): State<Guard>, request: Request, next: Next) -> Response {
     let mut response = match guard.refuses(request.method(), request.headers()) {
-        Some(why) => answer(StatusCode::FORBIDDEN, &json!({ "error": why })),
+        Some(why) => json_response(StatusCode::FORBIDDEN, &json!({ "error": why })),
         None => next.run(request).await,
     };
     let headers = response.headers_mut();
@@ -88,12 +88,14 @@ async fn arrived(request: Request, next: Next) -> Response {
     let (head, body) = request.into_parts();
     match tokio::time::timeout(REQUEST_TIME, to_bytes(body, LARGEST_BODY)).await {
         Ok(Ok(bytes)) => next.run(Request::from_parts(head, Body::from(bytes))).await,
-        Ok(Err(e)) => {
-            answer(StatusCode::PAYLOAD_TOO_LARGE, &json!({ "error": format!("reading the request: {e}") }))
-        }
-        Err(_) => {
-            answer(StatusCode::REQUEST_TIMEOUT, &json!({ "error": "the request took too long to arrive" }))
-        }
+        Ok(Err(e)) => json_response(
+            StatusCode::PAYLOAD_TOO_LARGE,
+            &json!({ "error": format!("reading the request: {e}") }),
+        ),
+        Err(_) => json_response(
+            StatusCode::REQUEST_TIMEOUT,
+            &json!({ "error": "the request took too long to arrive" }),
+        ),
     }
 }
 
@@ -102,7 +104,7 @@ async fn page(State(served): State<Arc<Served>>) -> Response {
 }
 
 async fn choices(State(served): State<Arc<Served>>) -> Response {
-    answer(StatusCode::OK, &json!(served.session.choices()))
+    json_response(StatusCode::OK, &json!(served.session.choices()))
 }
 
 /// Stops a refit when nobody waits for it any more: its request is dropped with the connection.
@@ -138,7 +140,7 @@ async fn keep(State(served): State<Arc<Served>>, body: Bytes) -> Response {
 
 fn too_many() -> Response {
     let why = format!("{MOST_ASKED} refits are under way already; ask again when they are done");
-    answer(StatusCode::SERVICE_UNAVAILABLE, &json!({ "error": why }))
+    json_response(StatusCode::SERVICE_UNAVAILABLE, &json!({ "error": why }))
 }
 
 /// Does the arithmetic beside the server's own thread; what cannot be done is told in words.
@@ -150,21 +152,24 @@ async fn asked(
     let wanted: Wanted = match serde_json::from_slice(&body) {
         Ok(wanted) => wanted,
         Err(e) => {
-            return answer(StatusCode::BAD_REQUEST, &json!({ "error": format!("reading the request: {e}") }));
+            return json_response(
+                StatusCode::BAD_REQUEST,
+                &json!({ "error": format!("reading the request: {e}") }),
+            );
         }
     };
     if wanted.count() > MOST_EFFECTS {
         let why = format!("{} effects are wanted at once, and {MOST_EFFECTS} at most can be", wanted.count());
-        return answer(StatusCode::BAD_REQUEST, &json!({ "error": why }));
+        return json_response(StatusCode::BAD_REQUEST, &json!({ "error": why }));
     }
     let done = tokio::task::spawn_blocking(move || what(&served.session, &wanted)).await;
     match done {
         Ok(Ok(text)) => ([(header::CONTENT_TYPE, "application/json")], text).into_response(),
-        Ok(Err(e)) => answer(StatusCode::UNPROCESSABLE_ENTITY, &json!({ "error": e.to_string() })),
-        Err(e) => answer(StatusCode::INTERNAL_SERVER_ERROR, &json!({ "error": e.to_string() })),
+        Ok(Err(e)) => json_response(StatusCode::UNPROCESSABLE_ENTITY, &json!({ "error": e.to_string() })),
+        Err(e) => json_response(StatusCode::INTERNAL_SERVER_ERROR, &json!({ "error": e.to_string() })),
     }
 }
 
-fn answer(status: StatusCode, value: &serde_json::Value) -> Response {
+fn json_response(status: StatusCode, value: &serde_json::Value) -> Response {
     (status, [(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
 }

@@ -3,7 +3,7 @@
 use super::requests::{Choices, Wanted};
 use super::source::Given;
 use crate::error::Error;
-use crate::extended::extend;
+use crate::extended::extend_pipeline;
 use crate::progress::Progress;
 use armcal_calibrate::{FitConfig, HoldoutConfig, Stop, calibrate};
 use armcal_config::Pipeline;
@@ -77,7 +77,8 @@ impl RefitSession {
             }
             results => {
                 let pipeline = Pipeline::load_for_others(&path)?;
-                let Pooled { run, geometry } = armcal_pipeline::pool(&pipeline, results, progress)?;
+                let Pooled { run, geometry } =
+                    armcal_pipeline::calibrate_jointly(&pipeline, results, progress)?;
                 (pipeline, geometry, run, None)
             }
         };
@@ -155,7 +156,7 @@ impl RefitSession {
             return Err(Error::NothingToKeep { path: self.path.clone() });
         }
         let sets = self.run.diagnosis.as_ref().map_or_else(Vec::new, Diagnosis::sets);
-        let extended = extend(&self.pipeline, &self.path, None, (&new, &sets))?;
+        let extended = extend_pipeline(&self.pipeline, &self.path, None, (&new, &sets))?;
         atomic::write(&extended.path, extended.pipeline.text.as_bytes()).map_err(Error::Output)?;
         Ok(extended.path)
     }

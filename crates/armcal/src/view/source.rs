@@ -19,7 +19,7 @@ struct Source {
 
 /// Leaves a note in `out` of where its pipeline is, and the results that it pools, as seen from there: both may move together, and the note does not
 /// depend on where they are. A path that no text can hold is not noted.
-pub fn remember(out: &Path, pipeline: &Path, results: &[PathBuf]) -> Result<(), Error> {
+pub fn write_source_file(out: &Path, pipeline: &Path, results: &[PathBuf]) -> Result<(), Error> {
     let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let folder = real(out);
     let seen = |path: &Path| pathdiff::diff_paths(real(path), &folder).unwrap_or_else(|| real(path));

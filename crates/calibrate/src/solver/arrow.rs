@@ -25,7 +25,7 @@ const STACKED: usize = 16;
 #[derive(Debug, Clone)]
 pub(crate) struct Arrow {
     structure: Arc<Structure>,
-    /// `[A_k | B_k]` of every group, as the triangle that has the same squares ([`root`]).
+    /// `[A_k | B_k]` of every group, as the triangle that has the same squares ([`gram_root`]).
     triangles: Arc<Vec<DMatrix<f64>>>,
     /// D, by axis.
     diagonal: DVector<f64>,
@@ -50,7 +50,7 @@ struct EliminatedGroup {
 }
 
 impl Arrow {
-    /// `triangles`: one a group, columns in the order of [`Structure::axes`]; see [`root`].
+    /// `triangles`: one a group, columns in the order of [`Structure::axes`]; see [`gram_root`].
     pub fn new(structure: Arc<Structure>, triangles: Vec<DMatrix<f64>>, diagonal: DVector<f64>) -> Arrow {
         Arrow { structure, triangles: Arc::new(triangles), diagonal }
     }
@@ -158,11 +158,11 @@ impl Arrow {
             .collect();
         let (groups, rest): (Vec<EliminatedGroup>, Vec<DMatrix<f64>>) = parts.into_iter().unzip();
         let stacks: Vec<DMatrix<f64>> =
-            rest.par_chunks(STACKED).map(|rows| triangle(stacked(rows))).collect();
+            rest.par_chunks(STACKED).map(|rows| triangular_factor(stack_rows(rows))).collect();
         let prior = DVector::from_iterator(shared.len(), shared.iter().map(|&a| self.diagonal[a].sqrt()));
         let mut factor = DMatrix::from_diagonal(&prior);
         for rows in stacks {
-            factor = triangle(stacked(&[factor, rows]));
+            factor = triangular_factor(stack_rows(&[factor, rows]));
         }
         let regular = |r: &DMatrix<f64>| r.diagonal().iter().all(|v| v.is_finite() && *v != 0.0);
         let all_regular = regular(&factor) && groups.iter().all(|group| regular(&group.factor));
@@ -189,7 +189,7 @@ impl Arrow {
             let coupling = DMatrix::zeros(0, free.len());
             return (EliminatedGroup { own, factor: nothing, coupling }, augmented);
         }
-        let reduced = triangle(augmented);
+        let reduced = triangular_factor(augmented);
         let (n, shared) = (own.len(), free.len() - own.len());
         let rest = reduced.nrows().saturating_sub(n);
         let eliminated = EliminatedGroup {
@@ -204,11 +204,11 @@ impl Arrow {
 /// A square root of `m'm`: an upper triangle R with `R'R = m'm`. Very tall matrices go through their product with themselves, which
 /// takes a fraction of the time and is as exact as that of a [`super::Curvature::Dense`]. Where columns depend on each other, its diagonal is raised by
 /// what its own rounding may have taken from it (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorem 10.7).
-pub(crate) fn root(m: DMatrix<f64>) -> DMatrix<f64> {
-    if is_tall(m.nrows(), m.ncols()) { root_of(gram(&m), m.nrows(), || m) } else { triangle(m) }
+pub(crate) fn gram_root(m: DMatrix<f64>) -> DMatrix<f64> {
+    if is_tall(m.nrows(), m.ncols()) { root_of(gram(&m), m.nrows(), || m) } else { triangular_factor(m) }
 }
 
-/// [`root`] of the squares of so many rows; the rows themselves where their squares have none.
+/// [`gram_root`] of the squares of so many rows; the rows themselves where their squares have none.
 pub(crate) fn root_of(squares: DMatrix<f64>, rows: usize, m: impl FnOnce() -> DMatrix<f64>) -> DMatrix<f64> {
     let raised = || {
         let mut raised = squares.clone();
@@ -218,7 +218,7 @@ pub(crate) fn root_of(squares: DMatrix<f64>, rows: usize, m: impl FnOnce() -> DM
         raised.cholesky()
     };
     let factor = squares.clone().cholesky().or_else(raised);
-    factor.map_or_else(|| triangle(m()), |factor| factor.unpack().transpose())
+    factor.map_or_else(|| triangular_factor(m()), |factor| factor.unpack().transpose())
 }
 
 /// Whether a matrix is so tall that its root goes through its squares.
@@ -234,7 +234,7 @@ const ROWS_A_COLUMN: usize = 3;
 
 /// The upper triangle R with `R'R = m'm` (Householder); no more rows than `m`. Of a tall matrix piece by piece, each below the
 /// triangle of those before it (Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci. Comput. 34, 2012: sequential TSQR).
-pub(crate) fn triangle(m: DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn triangular_factor(m: DMatrix<f64>) -> DMatrix<f64> {
     if m.nrows() == 0 || m.ncols() == 0 {
         return m;
     }
@@ -245,12 +245,12 @@ pub(crate) fn triangle(m: DMatrix<f64>) -> DMatrix<f64> {
     let mut r = m.rows(0, step).into_owned().qr().unpack_r();
     for from in (step..m.nrows()).step_by(step) {
         let piece = m.rows(from, step.min(m.nrows() - from));
-        r = stacked(&[r, piece.into_owned()]).qr().unpack_r();
+        r = stack_rows(&[r, piece.into_owned()]).qr().unpack_r();
     }
     r
 }
 
-fn stacked(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
+fn stack_rows(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
     let columns = parts.first().map_or(0, DMatrix::ncols);
     let mut all = DMatrix::zeros(parts.iter().map(DMatrix::nrows).sum(), columns);
     let mut at = 0;
@@ -263,7 +263,7 @@ fn stacked(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{root, triangle};
+    use super::{gram_root, triangular_factor};
     use nalgebra::DMatrix;
 
     /// Through the product as by reflections, of columns in any units, one of which is the sum of others and one nothing.
@@ -274,7 +274,7 @@ mod tests {
         m.set_column(7, &(m.column(1) + m.column(2)));
         m.column_mut(8).fill(0.0);
         let squares = m.tr_mul(&m);
-        for r in [root(m.clone()), triangle(m.clone())] {
+        for r in [gram_root(m.clone()), triangular_factor(m.clone())] {
             assert_eq!((r.shape(), &r), ((9, 9), &r.upper_triangle()));
             let off = r.tr_mul(&r) - &squares;
             let size = squares.diagonal().map(f64::sqrt);

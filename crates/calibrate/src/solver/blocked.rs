@@ -1,7 +1,7 @@
 //! Cholesky's factor of large matrices, and the inverse from it, by blocks: most of the work is products of matrices, which take a
 //! tenth of the time of the same work column by column (Golub and Van Loan, *Matrix Computations*, 4th ed., section 4.2.9).
 
-use crate::products::{gram, inner};
+use crate::products::{gram, inner_product};
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
 /// Columns to a block. Up to twice as many are left to nalgebra.
@@ -21,7 +21,7 @@ pub(crate) fn cholesky(mut a: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
         let below = own.solve_lower_triangular(&below)?;
         for at in (rest..n).step_by(BLOCK) {
             let columns = below.columns(at - rest, BLOCK.min(n - at));
-            let product = inner(&below.columns(at - rest, n - at), &columns);
+            let product = inner_product(&below.columns(at - rest, n - at), &columns);
             let mut left = a.view_mut((at, at), product.shape());
             left -= product;
         }

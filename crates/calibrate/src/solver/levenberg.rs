@@ -57,7 +57,7 @@ pub(crate) fn minimise(
             let Some(step) = step.filter(|d| d.iter().all(|v| v.is_finite())) else {
                 mu *= growth;
                 if mu > 1e20 {
-                    return Ok(stopped(at, model, Status::IterationLimit, iterations));
+                    return Ok(solution_at(at, model, Status::IterationLimit, iterations));
                 }
                 continue;
             };
@@ -65,9 +65,9 @@ pub(crate) fn minimise(
             let predicted = -model.gradient.dot(&step) - 0.5 * curvature;
             let rounding = 16.0 * f64::EPSILON * model.value.abs();
             let done = curvature.sqrt() <= settings.step_tolerance || predicted <= rounding;
-            let x = snapped(&at.x + step, &lower, &upper);
+            let x = snap_to_bounds(&at.x + step, &lower, &upper);
             if done && curvature.sqrt() <= NEGLIGIBLE && cost.ends_straight() {
-                return Ok(stopped(cost.moved(at, x), model, Status::Converged, iterations + 1));
+                return Ok(solution_at(cost.moved(at, x), model, Status::Converged, iterations + 1));
             }
             let trial = cost.at(x).ok();
             let value = trial.as_ref().map_or(f64::INFINITY, |trial| cost.value(trial));
@@ -77,7 +77,7 @@ pub(crate) fn minimise(
                 // step is worth says that the last step was wrong.
                 let tolerated = rounding.max(0.5 * settings.step_tolerance.powi(2));
                 let end = trial.filter(|_| value - model.value <= tolerated).unwrap_or(at);
-                return Ok(stopped(end, model, Status::Converged, iterations + 1));
+                return Ok(solution_at(end, model, Status::Converged, iterations + 1));
             }
             if let Some(trial) = trial.filter(|_| gain > 1e-4) {
                 mu = if gain > 0.5 { (0.1 * mu).max(1e-15) } else { mu };
@@ -88,20 +88,20 @@ pub(crate) fn minimise(
             mu *= growth;
             growth *= 2.0;
             if !mu.is_finite() {
-                return Ok(stopped(at, model, Status::IterationLimit, iterations));
+                return Ok(solution_at(at, model, Status::IterationLimit, iterations));
             }
         }
         model = cost.model(&at);
     }
-    Ok(stopped(at, model, Status::IterationLimit, settings.max_iterations))
+    Ok(solution_at(at, model, Status::IterationLimit, settings.max_iterations))
 }
 
-fn stopped(at: Point, model: Quadratic, status: Status, iterations: usize) -> Solution {
+fn solution_at(at: Point, model: Quadratic, status: Status, iterations: usize) -> Solution {
     Solution { at, hessian: model.hessian, status, iterations }
 }
 
 /// Puts what is at a bound up to rounding onto the bound.
-fn snapped(x: DVector<f64>, lower: &DVector<f64>, upper: &DVector<f64>) -> DVector<f64> {
+fn snap_to_bounds(x: DVector<f64>, lower: &DVector<f64>, upper: &DVector<f64>) -> DVector<f64> {
     DVector::from_fn(x.len(), |i, _| {
         let near = |bound: f64| bound.is_finite() && (x[i] - bound).abs() <= 1e-13 * (1.0 + bound.abs());
         if near(lower[i]) || x[i] < lower[i] {

@@ -16,7 +16,7 @@ mod bounded_qp;
 mod curvature;
 mod levenberg;
 
-pub(crate) use arrow::{Arrow, is_tall, root, root_of};
+pub(crate) use arrow::{Arrow, gram_root, is_tall, root_of};
 pub(crate) use curvature::Curvature;
 pub(crate) use levenberg::{Settings, Solution, minimise};
 

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use super::{Remembered, look};
+use super::{Remembered, evaluate_problem};
 use crate::FitConfig;
 use crate::problem::{Linearised, Problem};
 use armcal_core::{Parameter, Role, Unit};
@@ -100,7 +100,7 @@ fn columns_that_nobody_asked_for_are_not_taken_for_known() {
 fn a_problem_with_some_of_the_blocks_begins_with_what_is_known_of_these() {
     let problem = Counted::new();
     let p = [0.1, 0.2];
-    let known = look(&problem, &p, &|p| p.free, &FitConfig::default()).unwrap();
+    let known = evaluate_problem(&problem, &p, &|p| p.free, &FitConfig::default()).unwrap();
     assert_eq!(problem.asked(), [4, 4]);
     // The same blocks in another order: what they say is what is remembered, not what the problem itself would say.
     let fewer = Remembered::new(&problem, Some(known.of(&[3, 0, 1, 2])));

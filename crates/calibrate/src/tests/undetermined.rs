@@ -91,7 +91,7 @@ fn varimax_is_the_maximum_of_kaisers_criterion() {
 #[test]
 fn what_is_beyond_is_orthogonal_to_all_that_is_spanned() {
     let spanned = [unit(&[1.0, 0.0, 0.0]), unit(&[0.0, 3.0, 4.0])];
-    let rest = beyond(&DVector::from_vec(vec![2.0, 5.0, 10.0]), &spanned);
+    let rest = orthogonal_part(&DVector::from_vec(vec![2.0, 5.0, 10.0]), &spanned);
     // 5 * 0.6 + 10 * 0.8 = 11 along (0, 0.6, 0.8).
     assert!((rest - DVector::from_vec(vec![0.0, 5.0 - 6.6, 10.0 - 8.8])).amax() < 1e-12);
 }
@@ -141,26 +141,26 @@ fn a_small_share_that_is_needed_to_cancel_a_large_one_takes_part() {
 fn a_pair_is_taken_where_the_weak_subspace_holds_it() {
     let projector = |w: &DMatrix<f64>| w * w.transpose();
     let exact = projector(&weak(&[&[0.6, 0.0, -0.8, 0.0]]));
-    assert!(same(&inside(&exact, 0, 2).unwrap(), &unit(&[0.6, 0.0, -0.8, 0.0])));
+    assert!(same(&nearest_weak_direction(&exact, 0, 2).unwrap(), &unit(&[0.6, 0.0, -0.8, 0.0])));
     // The span of 0 and 1 holds only 36 % of it.
-    assert_eq!(inside(&exact, 0, 1), None);
+    assert_eq!(nearest_weak_direction(&exact, 0, 1), None);
     // Parameter 0 all but alone: 5 % of partner 1, though all of it is inside.
-    assert_eq!(inside(&projector(&weak(&[&[1.0, 0.05, 0.0, 0.0]])), 0, 1), None);
+    assert_eq!(nearest_weak_direction(&projector(&weak(&[&[1.0, 0.05, 0.0, 0.0]])), 0, 1), None);
     // Just enough of a partner.
-    assert!(inside(&projector(&weak(&[&[0.99, 0.14, 0.0, 0.0]])), 0, 1).is_some());
+    assert!(nearest_weak_direction(&projector(&weak(&[&[0.99, 0.14, 0.0, 0.0]])), 0, 1).is_some());
     // Nearly inside: the nearest direction of the subspace itself, not of the pair's plane.
     let w = weak(&[&[0.7, -0.7, 0.1, 0.0], &[0.0, 0.05, 0.3, 1.0]]);
-    let near = inside(&projector(&w), 0, 1).unwrap();
+    let near = nearest_weak_direction(&projector(&w), 0, 1).unwrap();
     assert!((w.transpose() * &near).norm() > 1.0 - 1e-12 && near[2].abs() > 0.01, "{near}");
     let in_plane = projector(&w).view((0, 0), (2, 2)).symmetric_eigen();
     let best = in_plane.eigenvectors.column(in_plane.eigenvalues.imax());
     let expected = (projector(&w) * DVector::from_vec(vec![best[0], best[1], 0.0, 0.0])).normalize();
     assert!(same(&near, &expected));
     // Too far outside: 10 % of the square.
-    assert_eq!(inside(&projector(&weak(&[&[0.67, -0.67, 0.32, 0.0]])), 0, 1), None);
+    assert_eq!(nearest_weak_direction(&projector(&weak(&[&[0.67, -0.67, 0.32, 0.0]])), 0, 1), None);
     // A single one is its own column.
     let single = projector(&weak(&[&[0.995, 0.0, 0.1, 0.0]]));
-    assert!(same(&inside(&single, 0, 0).unwrap(), &unit(&[0.995, 0.0, 0.1, 0.0])));
+    assert!(same(&nearest_weak_direction(&single, 0, 0).unwrap(), &unit(&[0.995, 0.0, 0.1, 0.0])));
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn what_no_pair_explains_is_turned_to_few_large_shares() {
     // A third, named: what is left is orthogonal to it, and of two directions.
     let c = unit(&[0.5, -0.5, 0.0, -1.0, 0.0, 2.0]);
     let w = weak(&[a.as_slice(), b.as_slice(), c.as_slice()]);
-    let left = remainder(&w, std::slice::from_ref(&c));
+    let left = remaining_directions(&w, std::slice::from_ref(&c));
     assert_eq!(left.len(), 2);
     assert!(left.iter().all(|direction| direction.dot(&c).abs() < 1e-9));
     let mut all = vec![c];
@@ -218,7 +218,7 @@ fn what_no_pair_explains_is_turned_to_few_large_shares() {
     assert_spans(&all, &w);
     // Nothing is left of what is spanned.
     let spanned: Vec<DVector<f64>> = w.column_iter().map(|column| column.into_owned()).collect();
-    assert!(remainder(&w, &spanned).is_empty());
+    assert!(remaining_directions(&w, &spanned).is_empty());
 }
 
 fn axis(index: usize, scale: f64) -> Axis {
@@ -241,7 +241,7 @@ fn symmetries_in_the_weak_subspace_are_found_in_units_of_the_prior() {
     let nothing = symmetry(&[0.0, 1.0, 0.0, 0.0], "what is fixed moves");
     let again = symmetry(&[-1.0, 0.0, -3.0, 0.0], "both move back");
     let all = [other, nothing, of_both, again];
-    let found = unseen(&w, &axes, &all);
+    let found = unseen_symmetries(&w, &axes, &all);
     assert_eq!(found.iter().map(|f| f.1).collect::<Vec<_>>(), ["both move"]);
     assert!((&found[0].0 - DVector::from_vec(vec![0.6, 0.8, 0.0])).amax() < 1e-12, "{}", found[0].0);
     // Where the subspace holds both, both are told, and their sum is not.
@@ -250,7 +250,7 @@ fn symmetries_in_the_weak_subspace_are_found_in_units_of_the_prior() {
     let sum = symmetry(&[2.0, 0.0, 6.0, 5.0], "all move");
     let all = [all[2].clone(), third, sum];
     assert_eq!(
-        unseen(&w, &axes, &all).iter().map(|f| f.1).collect::<Vec<_>>(),
+        unseen_symmetries(&w, &axes, &all).iter().map(|f| f.1).collect::<Vec<_>>(),
         ["both move", "the third moves"]
     );
 }

@@ -4,7 +4,7 @@ use crate::{ClosedChainSection, ClosureKind, Pipeline};
 use armcal_calibrate::HoldoutConfig;
 
 /// The key of a closed chain that cannot be, and why.
-pub fn contradiction(chain: &ClosedChainSection, pipeline: &Pipeline) -> Option<(&'static str, String)> {
+pub fn find_contradiction(chain: &ClosedChainSection, pipeline: &Pipeline) -> Option<(&'static str, String)> {
     if let HoldoutConfig::Cavities { .. } | HoldoutConfig::EveryNthCavity { .. } = pipeline.holdout {
         let said = "goes by cavity, but joined tips have none in common that armcal knows; use \"random\", \"cavity-folds\" \
                     (dwells are dealt out) or \"dwells\"";

@@ -36,7 +36,7 @@ pub fn check(
         return fail("frames.base.pose", problem.to_owned());
     }
     for (at, section) in pipeline.measure.iter().enumerate() {
-        if let Some((key, problem)) = contradiction(pipeline, section) {
+        if let Some((key, problem)) = find_contradiction(pipeline, section) {
             return fail(&format!("measure[{at}].{key}"), problem);
         }
         if pipeline.measure[..at].iter().any(|other| other.name() == section.name()) {
@@ -55,7 +55,7 @@ pub fn check(
 }
 
 /// The key of a measurement that cannot be, and why.
-fn contradiction(pipeline: &Pipeline, m: &MeasureSection) -> Option<(&'static str, String)> {
+fn find_contradiction(pipeline: &Pipeline, m: &MeasureSection) -> Option<(&'static str, String)> {
     let [of, against] = &m.between;
     if pipeline.feature(of).is_none() {
         let known: Vec<&str> =

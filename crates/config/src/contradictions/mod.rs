@@ -57,7 +57,7 @@ pub fn in_sections(pipeline: &Pipeline, path: &Path) -> Result<(), ConfigError> 
     markers::check(pipeline, &fail)?;
     measures::check(pipeline, &fail)?;
     if let Some((key, said)) =
-        pipeline.closed_chain.as_ref().and_then(|chain| closed_chain::contradiction(chain, pipeline))
+        pipeline.closed_chain.as_ref().and_then(|chain| closed_chain::find_contradiction(chain, pipeline))
     {
         return fail(key, said);
     }

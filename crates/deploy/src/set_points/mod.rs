@@ -37,7 +37,7 @@ pub fn recording_index(past: &StoredModel, name: &str) -> Result<usize, String> 
 }
 
 /// Targets as the model takes them.
-pub fn placed(
+pub fn place_targets(
     arms: &StoredArms,
     (feature, frame): (FeatureId, TargetFrame),
     wanted: &[Wanted],
@@ -59,6 +59,6 @@ pub fn in_world_m(arms: &StoredArms, frame: TargetFrame, target: &Target) -> Vec
 }
 
 /// The suffix of a joint's columns: SI and display.
-pub(crate) fn suffixes(unit: Unit) -> [&'static str; 2] {
+pub(crate) fn unit_suffixes(unit: Unit) -> [&'static str; 2] {
     if unit == Unit::Metre { ["m", "mm"] } else { ["rad", "deg"] }
 }

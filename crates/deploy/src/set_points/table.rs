@@ -1,11 +1,11 @@
 //! Set-points as CSV, as JSON and for the terminal.
 
-use super::suffixes;
+use super::unit_suffixes;
 use crate::error::DeployError;
 use armcal_compensate::{Kind, SetPoint};
 use armcal_core::{Arrival, ErrorStats};
 use armcal_model::Chain;
-use armcal_report::{number, plain_table, table_text};
+use armcal_report::{number_cell, plain_table, table_text};
 use comfy_table::Cell;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ pub struct Sheet<'a> {
 }
 
 /// Errors before and after over all targets [m].
-pub fn errors(points: &[SetPoint]) -> [ErrorStats; 2] {
+pub fn target_errors(points: &[SetPoint]) -> [ErrorStats; 2] {
     let of = |pick: fn(&armcal_compensate::Reached) -> f64| {
         let all: Vec<f64> = points.iter().filter_map(|p| p.reached.as_ref().map(pick)).collect();
         ErrorStats::of_norms(&all)
@@ -48,7 +48,7 @@ impl Sheet<'_> {
 
     fn joints(&self) -> impl Iterator<Item = (usize, &String, [&'static str; 2])> {
         let names = self.chain.joint_names().iter().enumerate();
-        names.map(|(j, name)| (j, name, suffixes(self.chain.joint_unit(j))))
+        names.map(|(j, name)| (j, name, unit_suffixes(self.chain.joint_unit(j))))
     }
 
     fn header(&self) -> Vec<String> {
@@ -63,7 +63,7 @@ impl Sheet<'_> {
 
     fn row(&self, point: &SetPoint, at: &Vector3<f64>) -> Vec<String> {
         let optional = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
-        let mut row = vec![point.target.name.clone(), kind(point).into(), optional(point.target.time_s)];
+        let mut row = vec![point.target.name.clone(), kind_name(point).into(), optional(point.target.time_s)];
         row.extend(at.iter().map(f64::to_string));
         row.extend(point.nominal_rad.iter().map(f64::to_string));
         row.extend(point.joint_rad.iter().map(f64::to_string));
@@ -86,10 +86,10 @@ impl Sheet<'_> {
 
     /// The same for programs.
     pub fn json(&self) -> Value {
-        let [before, after] = errors(self.points);
+        let [before, after] = target_errors(self.points);
         let point = |(p, at): (&SetPoint, &Vector3<f64>)| {
             json!({
-                "name": p.target.name, "kind": kind(p), "t_s": p.target.time_s, "target_m": at.as_slice(),
+                "name": p.target.name, "kind": kind_name(p), "t_s": p.target.time_s, "target_m": at.as_slice(),
                 "nominal_rad": p.nominal_rad, "set_point_rad": p.joint_rad,
                 "arrival": p.arrival.iter().map(|a| a.sign() as i32).collect::<Vec<i32>>(),
                 "before_mm": p.reached.as_ref().map(|r| r.before_m * 1e3),
@@ -116,17 +116,17 @@ impl Sheet<'_> {
         header.extend(["correction", "arrive", "before [mm]", "after [mm]"].map(str::to_owned));
         table.set_header(header);
         for (point, at) in self.points.iter().zip(&self.in_world_m).take(SHOWN) {
-            let mut cells = vec![Cell::new(&point.target.name), Cell::new(millimetres(at))];
+            let mut cells = vec![Cell::new(&point.target.name), Cell::new(position_mm_text(at))];
             let units = |j: usize| self.chain.joint_unit(j);
             let joints = point.joint_rad.iter().enumerate();
-            cells.extend(joints.map(|(j, q)| number(format!("{:.3}", units(j).to_display(*q)))));
+            cells.extend(joints.map(|(j, q)| number_cell(format!("{:.3}", units(j).to_display(*q)))));
             let corrections: Vec<String> = self.corrections(point).map(|c| format!("{c:+.3}")).collect();
             cells.push(Cell::new(corrections.join(" ")));
             cells.push(Cell::new(point.arrival.iter().map(Arrival::symbol).collect::<String>()));
             match &point.reached {
                 Some(r) => cells.extend([
-                    number(format!("{:.2}", r.before_m * 1e3)),
-                    number(format!("{:.3}", r.after_m * 1e3)),
+                    number_cell(format!("{:.2}", r.before_m * 1e3)),
+                    number_cell(format!("{:.3}", r.after_m * 1e3)),
                 ]),
                 None => cells.extend([Cell::new("on the way"), Cell::new("")]),
             }
@@ -136,7 +136,7 @@ impl Sheet<'_> {
         if self.points.len() > SHOWN {
             text += &format!("... and {} more in the file\n", self.points.len() - SHOWN);
         }
-        let [before, after] = errors(self.points);
+        let [before, after] = target_errors(self.points);
         text += &format!(
             "\nBy the calibrated model the tip would miss {} targets by {:.2} mm on average (at most {:.2}) at nominal \
              set-points, and by {:.3} mm (at most {:.3}) at these.\n",
@@ -166,13 +166,13 @@ impl Sheet<'_> {
     }
 }
 
-fn kind(point: &SetPoint) -> &'static str {
+fn kind_name(point: &SetPoint) -> &'static str {
     match point.kind {
         Kind::Target => "target",
         Kind::Approach => "approach",
     }
 }
 
-fn millimetres(at_m: &Vector3<f64>) -> String {
+fn position_mm_text(at_m: &Vector3<f64>) -> String {
     at_m.iter().map(|v| format!("{:.1}", v * 1e3)).collect::<Vec<String>>().join(", ")
 }

@@ -51,7 +51,7 @@ pub fn read(path: &Path) -> Result<Vec<Wanted>, DeployError> {
         from_csv(&text)
     };
     let mut targets = parsed.map_err(bad)?;
-    check(&targets).map_err(bad)?;
+    check_targets(&targets).map_err(bad)?;
     for (i, target) in targets.iter_mut().enumerate().filter(|(_, t)| t.name.is_empty()) {
         target.name = format!("target{}", i + 1);
     }
@@ -98,7 +98,7 @@ fn from_csv(text: &str) -> Result<Vec<Wanted>, String> {
     Ok(targets)
 }
 
-fn check(targets: &[Wanted]) -> Result<(), String> {
+fn check_targets(targets: &[Wanted]) -> Result<(), String> {
     for (i, target) in targets.iter().enumerate() {
         let row = i + 1;
         let length = target.quaternion_xyzw.map_or(1.0, |q| q.iter().map(|v| v * v).sum::<f64>());

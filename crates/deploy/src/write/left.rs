@@ -71,7 +71,7 @@ fn of_this_result(observed: &StoredObservations, past: &StoredModel) -> bool {
 
 /// Distances between where a file has the tip and where the calibrated model, with its effects, has it. What a file holds is the
 /// geometry, or `zeros` on the nominal one.
-pub fn left(source: &Source<'_>, recorded: &Recorded, zeros: Option<&JointZeros>) -> ErrorStats {
+pub fn remaining_errors(source: &Source<'_>, recorded: &Recorded, zeros: Option<&JointZeros>) -> ErrorStats {
     let geometry = &source.arms.geometry;
     let values = &source.arms.values[..geometry.parameters().len()];
     let off = |(o, tip_m): &(Observation, Vector3<f64>)| {

@@ -1,11 +1,11 @@
 //! The calibrated arm of a finished run in a format that others read: the text, what is in it, what is not.
 //!
-//! [`Source`] is the result, [`made`] puts the text together, [`left`] says how far off it leaves the arm.
+//! [`Source`] is the result, [`make_file`] puts the text together, [`left::remaining_errors`] says how far off it leaves the arm.
 
 pub mod left;
 
 use crate::error::DeployError;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_core::{FeatureId, Pose, RollPitchYaw};
 use armcal_formats::dh::DhRows;
 use armcal_formats::ur::{UrKinematics, hash_in};
@@ -85,19 +85,19 @@ impl<'a> Source<'a> {
     /// Where the tip is on its last link, for whoever enters it by hand; none where it is that link.
     fn tip_by_hand(&self, on: &str) -> Option<String> {
         let at = self.arms.model.feature_in_link(&self.arms.values, FeatureId(self.arm));
-        (at != Pose::identity()).then(|| format!("the tip: in {on} it lies at {}", shown(&at)))
+        (at != Pose::identity()).then(|| format!("the tip: in {on} it lies at {}", pose_text(&at)))
     }
 
     /// The markers, by name; none where there are none.
     fn markers(&self) -> Option<String> {
         let names = self.skeleton.places.iter().filter(|place| place.feature != FeatureId(self.arm));
-        let names: Vec<String> = names.map(|place| printable(&place.name)).collect();
+        let names: Vec<String> = names.map(|place| printable_name(&place.name)).collect();
         (!names.is_empty()).then(|| format!("markers: {}", names.join(", ")))
     }
 }
 
 /// The file in a format. `hash_from` is the text of the arm's own kinematics file, `recorded` the session.
-pub fn made(
+pub fn make_file(
     source: &Source<'_>,
     format: Format,
     hash_from: Option<&str>,
@@ -108,8 +108,8 @@ pub fn made(
         Format::Urdf => of_skeleton(source, urdf::urdf(&source.skeleton), "a link on a fixed joint"),
         Format::Mjcf => of_skeleton(source, mjcf::mjcf(&source.skeleton), "a site"),
         Format::Sdf => of_skeleton(source, sdf::sdf(&source.skeleton)?, "a frame"),
-        Format::Xacro => origins(source)?,
-        Format::UrYaml => ur(source, hash_from)?,
+        Format::Xacro => xacro_origins(source)?,
+        Format::UrYaml => ur_kinematics(source, hash_from)?,
         Format::JointZeros => joint_zeros(source, recorded),
         Format::DhCsv => dh_rows(source)?,
     };
@@ -125,7 +125,7 @@ pub fn made(
 }
 
 /// A pose for people: millimetres, and roll, pitch, yaw in degrees.
-fn shown(pose: &Pose) -> String {
+fn pose_text(pose: &Pose) -> String {
     let RollPitchYaw { xyz_m: [x, y, z], rpy_deg: [roll, pitch, yaw] } = pose.into();
     let [x, y, z] = [x, y, z].map(|v| v * 1e3 + 0.0);
     format!(
@@ -137,8 +137,8 @@ fn shown(pose: &Pose) -> String {
 }
 
 /// The joints, by number and first and last name.
-fn counted<'s>(what: &str, joints: impl Iterator<Item = (&'s str, &'s Moving)>) -> String {
-    let joints: Vec<String> = joints.map(|(name, _)| printable(name)).collect();
+fn joints_text<'s>(what: &str, joints: impl Iterator<Item = (&'s str, &'s Moving)>) -> String {
+    let joints: Vec<String> = joints.map(|(name, _)| printable_name(name)).collect();
     match &joints[..] {
         [first, .., last] => format!("{what} of {} joints, {first} to {last}", joints.len()),
         _ => format!("{what} of {}", joints.join(", ")),
@@ -152,7 +152,7 @@ fn own_urdf(source: &Source<'_>) -> Result<Made, DeployError> {
     let (text, warnings) =
         arms.model.to_urdf_with(source.arm, tip, text, Path::new("URDF of the result"), &arms.values)?;
     let holds = vec![
-        counted("origins", source.joints()),
+        joints_text("origins", source.joints()),
         "everything else of the URDF that the arm came from, as it was".to_owned(),
     ];
     Ok(with_tip(
@@ -163,7 +163,7 @@ fn own_urdf(source: &Source<'_>) -> Result<Made, DeployError> {
 }
 
 /// The same origins to be included.
-fn origins(source: &Source<'_>) -> Result<Made, DeployError> {
+fn xacro_origins(source: &Source<'_>) -> Result<Made, DeployError> {
     if !source.is_urdf() {
         let problem = "it came from a DH table, and there is no description whose origins it could replace; urdf makes one";
         let problem = problem.to_owned();
@@ -172,7 +172,7 @@ fn origins(source: &Source<'_>) -> Result<Made, DeployError> {
     let tip = source.tip_is_calibrated();
     let (origins, warnings) = source.arms.model.calibrated_origins(source.arm, tip, &source.arms.values)?;
     let text = xacro::xacro(&origins).into_bytes();
-    let made = Made { text, holds: vec![counted("origins", source.joints())], ..Made::empty() };
+    let made = Made { text, holds: vec![joints_text("origins", source.joints())], ..Made::empty() };
     let mut made = with_tip(source, made, tip && warnings.is_empty());
     made.notes.extend(xacro::HOW.map(str::to_owned));
     Ok(made)
@@ -190,12 +190,12 @@ fn with_tip(source: &Source<'_>, mut made: Made, written: bool) -> Made {
 
 /// Every link and joint anew.
 fn of_skeleton(source: &Source<'_>, text: String, place: &str) -> Made {
-    let names: Vec<String> = source.skeleton.places.iter().map(|place| printable(&place.name)).collect();
+    let names: Vec<String> = source.skeleton.places.iter().map(|place| printable_name(&place.name)).collect();
     let limits = source.limits();
     let mut made = Made {
         text: text.into_bytes(),
         holds: vec![
-            counted("origins and axes", source.joints()),
+            joints_text("origins and axes", source.joints()),
             format!("{}, {}{place}", names.join(", "), if names.len() > 1 { "each " } else { "" }),
         ],
         lacks: vec!["masses, inertias, meshes".into()],
@@ -210,14 +210,17 @@ fn of_skeleton(source: &Source<'_>, text: String, place: &str) -> Made {
     made
 }
 
-fn ur(source: &Source<'_>, hash_from: Option<&str>) -> Result<Made, DeployError> {
+fn ur_kinematics(source: &Source<'_>, hash_from: Option<&str>) -> Result<Made, DeployError> {
     let tip = source.tip(Format::UrYaml)?;
     let kinematics = UrKinematics::of(&source.skeleton, tip, !source.is_urdf())?;
     let hash = hash_in(hash_from.unwrap_or_default())?;
     let mut made = Made {
         text: kinematics.yaml(&source.skeleton.name, &hash).into_bytes(),
-        holds: vec![counted("origins", source.joints()), format!("the hash {hash} of the arm's own file")],
-        by_hand: Some(format!("the tip: in tool0 it lies at {}", shown(&kinematics.tip_in_tool0))),
+        holds: vec![
+            joints_text("origins", source.joints()),
+            format!("the hash {hash} of the arm's own file"),
+        ],
+        by_hand: Some(format!("the tip: in tool0 it lies at {}", pose_text(&kinematics.tip_in_tool0))),
         ..Made::empty()
     };
     let end = kinematics.end_in_tool0;
@@ -250,7 +253,7 @@ fn joint_zeros(source: &Source<'_>, recorded: &Recorded) -> Made {
     let of_arm = JointZeros { offset: zeros.offset[own].to_vec(), values: Vec::new() };
     let mut made = Made {
         text: of_arm.yaml(&source.skeleton).into_bytes(),
-        holds: vec![counted("offsets", source.joints().filter(|(_, moving)| moving.follows.is_none()))],
+        holds: vec![joints_text("offsets", source.joints().filter(|(_, moving)| moving.follows.is_none()))],
         lacks: vec!["calibrated lengths and angles: those of the controller stay nominal".into()],
         notes: vec![
             "true reading = reading + offset; the file says what that is in ros2_control and in a URDF"
@@ -261,7 +264,7 @@ fn joint_zeros(source: &Source<'_>, recorded: &Recorded) -> Made {
     };
     let (tip, base) = (FeatureId(source.arm), source.arm);
     if nominal.feature_parameters(tip).any(|index| frames.contains(&index)) {
-        let at = shown(&nominal.feature_in_link(&zeros.values, tip));
+        let at = pose_text(&nominal.feature_in_link(&zeros.values, tip));
         made.by_hand = Some(format!("the tip: with these offsets it lies in the last link at {at}"));
     }
     if nominal.base_parameters(base).any(|index| frames.contains(&index)) {
@@ -289,7 +292,7 @@ fn dh_rows(source: &Source<'_>) -> Result<Made, DeployError> {
     };
     let mut made = Made {
         text: rows.csv()?,
-        holds: vec![counted("rows", source.joints())],
+        holds: vec![joints_text("rows", source.joints())],
         notes: vec![format!(
             "{} DH: {formula}, the reading is added to theta (sliding: to d)",
             rows.convention

@@ -22,7 +22,7 @@ pub struct Cause {
 }
 
 /// The cause of a name.
-pub fn cause(name: &str) -> Option<&'static Cause> {
+pub fn find_cause(name: &str) -> Option<&'static Cause> {
     CAUSES.get(name)
 }
 
@@ -40,7 +40,7 @@ mod tests {
         let kinds = kinds();
         for kind in &kinds {
             assert!(
-                cause(kind.cause).is_some(),
+                find_cause(kind.cause).is_some(),
                 "{} is caused by {}, which is not in the table",
                 kind.name,
                 kind.cause

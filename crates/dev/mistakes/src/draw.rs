@@ -10,7 +10,7 @@ pub struct Draw(Stream);
 impl Draw {
     /// The numbers of the case `name` on `rig`.
     pub fn new(seed: u64, name: &str, rig: &str) -> Draw {
-        Draw(Stream::new(mixed(seed, name, rig), Purpose::Scenario, 1))
+        Draw(Stream::new(case_seed(seed, name, rig), Purpose::Scenario, 1))
     }
 
     /// Uniform between two bounds.
@@ -61,7 +61,7 @@ impl Draw {
 }
 
 /// A seed of the case's own (FNV-1a over its name), so that another list of cases leaves it as it is.
-pub fn mixed(seed: u64, name: &str, rig: &str) -> u64 {
+pub fn case_seed(seed: u64, name: &str, rig: &str) -> u64 {
     let bytes = seed.to_le_bytes().into_iter().chain(rig.bytes()).chain(name.bytes());
     let hash = bytes
         .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));

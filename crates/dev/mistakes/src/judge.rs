@@ -1,6 +1,6 @@
 //! Judges what was said to a mistake, by nothing but that.
 
-use crate::causes::{Cause, cause};
+use crate::causes::{Cause, find_cause};
 use crate::run::{Place, Said, Statement};
 use crate::{Draw, Error, Kind, Rig, run};
 use serde::{Deserialize, Serialize};
@@ -69,7 +69,7 @@ pub struct Case {
 }
 
 /// Makes one mistake on one rig, runs the program on it in `folder`, and judges.
-pub fn case(armcal: &Path, kind: &Kind, rig: Rig, seed: u64, folder: &Path) -> Result<Case, Error> {
+pub fn run_case(armcal: &Path, kind: &Kind, rig: Rig, seed: u64, folder: &Path) -> Result<Case, Error> {
     let mut session = rig.session(seed, kind.name)?;
     let about = kind.make(&mut session, &mut Draw::new(seed, kind.name, rig.word()))?;
     let said = run::run(armcal, &session, folder)?;
@@ -88,7 +88,7 @@ impl Case {
 
 /// What of it names the cause, and how right the whole is.
 pub fn judge(said: &Said, cause_name: &str, about: &[String]) -> (Option<String>, Judgement) {
-    let reported = reported(said, cause_name, about);
+    let reported = find_report(said, cause_name, about);
     let above = |floors: f64| said.ratio().is_none_or(|ratio| ratio.is_nan() || ratio > floors);
     let done = matches!(said.exit, Some(0 | 3));
     let findings = said.statements.iter().any(|s| s.place == Place::Setup);
@@ -105,10 +105,10 @@ pub fn judge(said: &Said, cause_name: &str, about: &[String]) -> (Option<String>
     (reported, judgement)
 }
 
-fn reported(said: &Said, name: &str, about: &[String]) -> Option<String> {
-    let cause = cause(name)?;
+fn find_report(said: &Said, name: &str, about: &[String]) -> Option<String> {
+    let cause = find_cause(name)?;
     let of_cavity = name == "board-typo";
-    let statement = said.statements.iter().find(|s| names(s, cause, of_cavity, about));
+    let statement = said.statements.iter().find(|s| names_cause(s, cause, of_cavity, about));
     let label = |s: &Statement| match s.code.as_str() {
         "" => "error message".to_owned(),
         code => code.to_owned(),
@@ -121,7 +121,7 @@ fn reported(said: &Said, name: &str, about: &[String]) -> Option<String> {
     statement.map(label).or_else(effect)
 }
 
-fn names(statement: &Statement, cause: &Cause, of_cavity: bool, about: &[String]) -> bool {
+fn names_cause(statement: &Statement, cause: &Cause, of_cavity: bool, about: &[String]) -> bool {
     let text = without_checklists(&statement.text.to_lowercase());
     let code = cause.codes.iter().any(|code| statement.code.contains(code.as_str()));
     if !code && !cause.words.iter().any(|word| text.contains(word.as_str())) {

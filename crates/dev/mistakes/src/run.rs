@@ -75,11 +75,11 @@ impl Said {
         };
         let named = list("/diagnosis/names").into_iter().chain(list("/diagnosis/effects"));
         said.effects = named.flat_map(|entry| strings(&entry)).collect();
-        said.statements.extend(list("/setup/findings").iter().map(|f| statement(Place::Setup, f)));
-        said.statements.extend(list("/warnings").iter().map(|w| statement(Place::Warning, w)));
+        said.statements.extend(list("/setup/findings").iter().map(|f| read_statement(Place::Setup, f)));
+        said.statements.extend(list("/warnings").iter().map(|w| read_statement(Place::Warning, w)));
         for recording in list("/recordings") {
             let warnings = recording.get("warnings").and_then(Value::as_array).cloned().unwrap_or_default();
-            said.statements.extend(warnings.iter().map(|w| statement(Place::Warning, w)));
+            said.statements.extend(warnings.iter().map(|w| read_statement(Place::Warning, w)));
         }
         said
     }
@@ -95,7 +95,7 @@ fn strings(value: &Value) -> Vec<String> {
     }
 }
 
-fn statement(place: Place, value: &Value) -> Statement {
+fn read_statement(place: Place, value: &Value) -> Statement {
     let text = |key: &str| value.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
     Statement { place, code: text("code"), text: format!("{}: {}", text("subject"), text("message")) }
 }
@@ -137,13 +137,13 @@ pub fn run(armcal: &Path, session: &Session, folder: &Path) -> Result<Said, Erro
     if !matches!(exit, Some(0 | 3)) {
         let text = std::fs::read(&errors).map_err(Error::file("reading", &errors))?;
         let text = String::from_utf8_lossy(&text).replace(&*folder.to_string_lossy(), "");
-        said.statements.push(Statement { place: Place::Error, code: bracketed(&text), text });
+        said.statements.push(Statement { place: Place::Error, code: codes_in_brackets(&text), text });
     }
     Ok(Said { exit, ..said })
 }
 
 /// The codes of findings that an error message names, in brackets: `[joint-order]`. A section of a file has no hyphen.
-fn bracketed(text: &str) -> String {
+fn codes_in_brackets(text: &str) -> String {
     let inside = text.split('[').skip(1).filter_map(|rest| rest.split_once(']').map(|(inside, _)| inside));
     let code = |s: &&str| s.contains('-') && s.chars().all(|c| c.is_ascii_lowercase() || c == '-');
     inside.filter(code).collect::<Vec<_>>().join(" ")

@@ -93,7 +93,7 @@ impl Session {
 
     /// Topic of a tracked body.
     pub fn topic(&self, body: Body) -> &'static str {
-        rigs::topic(self.rig, body)
+        rigs::body_topic(self.rig, body)
     }
 
     /// Changes every joint state. Speeds are worked out anew from the changed angles, as a driver would.
@@ -131,7 +131,7 @@ impl Session {
     /// Changes every message of a topic.
     pub fn messages(&mut self, topic: &str, mut change: impl FnMut(&At, &mut Message)) {
         for (recording, recorded) in self.recordings.iter_mut().enumerate() {
-            let Some((start_ns, end_ns)) = span(&recorded.log.messages) else { continue };
+            let Some((start_ns, end_ns)) = stamp_range_ns(&recorded.log.messages) else { continue };
             let channels = &recorded.log.channels;
             let of_topic = |m: &&mut Message| channels.get(m.channel).is_some_and(|c| c.topic == topic);
             for message in recorded.log.messages.iter_mut().filter(of_topic) {
@@ -163,17 +163,17 @@ impl Session {
 
     /// A key of the pipeline, with the tables to it made where they are missing.
     pub fn set(&mut self, path: &[&str], value: impl Into<Value>) {
-        set(&mut self.pipeline, path, value.into());
+        set_key(&mut self.pipeline, path, value.into());
     }
 
     /// The entries of `[[recordings]]` of the pipeline.
     pub fn entries(&mut self) -> &mut Vec<Value> {
-        array(&mut self.pipeline, "recordings")
+        array_entry(&mut self.pipeline, "recordings")
     }
 
     /// The rows of the arm's table.
     pub fn rows(&mut self) -> &mut Vec<Value> {
-        array(&mut self.arm, "rows")
+        array_entry(&mut self.arm, "rows")
     }
 
     /// Changes every entry of the arm's table.
@@ -194,7 +194,9 @@ impl Session {
     /// Changes the drawn position of every cavity [mm].
     pub fn cavities(&mut self, mut change: impl FnMut(usize, &mut [f64; 3])) {
         let Some(board) = &mut self.board else { return };
-        for (i, cavity) in array(board, "cavities").iter_mut().filter_map(Value::as_table_mut).enumerate() {
+        for (i, cavity) in
+            array_entry(board, "cavities").iter_mut().filter_map(Value::as_table_mut).enumerate()
+        {
             let Some(Value::Array(xyz)) = cavity.get_mut("xyz_mm") else { continue };
             let mut mm = [0.0; 3];
             mm.iter_mut().zip(xyz.iter()).for_each(|(mm, v)| *mm = v.as_float().unwrap_or_default());
@@ -213,11 +215,11 @@ impl Session {
                 damage.apply(&path)?;
             }
         }
-        put(folder, "arm.toml", &self.arm)?;
+        write_toml(folder, "arm.toml", &self.arm)?;
         if let Some(board) = &self.board {
-            put(folder, "board.toml", board)?;
+            write_toml(folder, "board.toml", board)?;
         }
-        put(folder, "pipeline.toml", &self.pipeline)
+        write_toml(folder, "pipeline.toml", &self.pipeline)
     }
 }
 
@@ -238,12 +240,12 @@ impl Damage {
 }
 
 /// First and last stamp.
-pub fn span(messages: &[Message]) -> Option<(i64, i64)> {
+pub fn stamp_range_ns(messages: &[Message]) -> Option<(i64, i64)> {
     let stamps = || messages.iter().map(|m| m.stamp_ns);
     Some((stamps().min()?, stamps().max()?))
 }
 
-fn put(folder: &Path, name: &'static str, table: &Table) -> Result<PathBuf, Error> {
+fn write_toml(folder: &Path, name: &'static str, table: &Table) -> Result<PathBuf, Error> {
     let text = toml::to_string(table).map_err(|e| Error::Text { what: name, source: Box::new(e) })?;
     let path = folder.join(name);
     std::fs::write(&path, text).map_err(Error::file("writing", &path))?;
@@ -251,7 +253,7 @@ fn put(folder: &Path, name: &'static str, table: &Table) -> Result<PathBuf, Erro
 }
 
 /// Sets a key, with the tables to it made where they are missing.
-pub fn set(table: &mut Table, path: &[&str], value: Value) {
+pub fn set_key(table: &mut Table, path: &[&str], value: Value) {
     let Some((last, tables)) = path.split_last() else { return };
     let mut at = table;
     for key in tables {
@@ -262,7 +264,7 @@ pub fn set(table: &mut Table, path: &[&str], value: Value) {
     at.insert((*last).to_owned(), value);
 }
 
-fn array<'t>(table: &'t mut Table, key: &str) -> &'t mut Vec<Value> {
+fn array_entry<'t>(table: &'t mut Table, key: &str) -> &'t mut Vec<Value> {
     let entry = table.entry(key).or_insert_with(|| Value::Array(Vec::new()));
     if !entry.is_array() {
         *entry = Value::Array(Vec::new());

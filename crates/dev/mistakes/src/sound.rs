@@ -4,7 +4,7 @@ use crate::judge::{NOTHING, SHOWN};
 use crate::rigs::{Hidden, session_of, six_axis};
 use crate::run::{Place, Said};
 use crate::{Draw, Error, Rig, Session, draw, run};
-use armcal_lab::scenario::{Design, Scenario, families};
+use armcal_lab::scenario::{Design, Scenario, catalogue_families};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -31,43 +31,43 @@ pub struct Sound {
 }
 
 /// Draws sound session `number`, runs the program on it in `folder`, and judges.
-pub fn sound(armcal: &Path, number: usize, seed: u64, folder: &Path) -> Result<Sound, Error> {
-    let (rig, hidden, session) = session(number, seed)?;
+pub fn run_session(armcal: &Path, number: usize, seed: u64, folder: &Path) -> Result<Sound, Error> {
+    let (rig, hidden, session) = draw_session(number, seed)?;
     let said = run::run(armcal, &session, folder)?;
-    let alarms = alarms(&said, &hidden);
+    let alarms = false_alarms(&said, &hidden);
     Ok(Sound { number, rig, hidden, said, alarms })
 }
 
 impl Sound {
     /// Judges again what was said.
     pub fn judged_again(self) -> Sound {
-        Sound { alarms: alarms(&self.said, &self.hidden), ..self }
+        Sound { alarms: false_alarms(&self.said, &self.hidden), ..self }
     }
 }
 
 /// The rigs in turn, and on each by turns nothing hidden and one effect of a drawn size.
-fn session(number: usize, seed: u64) -> Result<(Rig, String, Session), Error> {
+fn draw_session(number: usize, seed: u64) -> Result<(Rig, String, Session), Error> {
     let rig = Rig::ALL[number % 3];
     let case = format!("sound {number}");
     let mut draw = Draw::new(seed, &case, rig.word());
     if (number / 3).is_multiple_of(2) {
         return Ok((rig, "nothing".to_owned(), rig.session(seed, &case)?));
     }
-    let seed = draw::mixed(seed, &case, rig.word());
+    let seed = draw::case_seed(seed, &case, rig.word());
     if rig == Rig::Poses {
         let hidden = Hidden::draw(&mut draw);
         let lab = six_axis::Lab { hidden: Some(hidden), ..six_axis::Lab::new(seed) };
         return Ok((rig, hidden.word().to_owned(), six_axis::session(lab)?));
     }
     let physical = |family: &&str| !FAULTS.iter().any(|fault| family.starts_with(fault));
-    let families: Vec<&str> = families().into_iter().filter(physical).collect();
+    let families: Vec<&str> = catalogue_families().into_iter().filter(physical).collect();
     let family = families[draw.pick(families.len())];
     let design = [Design::ThreeTiltsOnePass, Design::ThreeTiltsBothWays, Design::FreePoses][draw.pick(3)];
     let config = Scenario::new(family, design, seed).plant()?.config;
     Ok((rig, family.to_owned(), session_of(rig, config)?))
 }
 
-fn alarms(said: &Said, hidden: &str) -> Vec<String> {
+fn false_alarms(said: &Said, hidden: &str) -> Vec<String> {
     let mut alarms = Vec::new();
     if !matches!(said.exit, Some(0 | 3)) {
         let text = said.statements.last().map(|s| s.text.lines().next().unwrap_or_default().to_owned());

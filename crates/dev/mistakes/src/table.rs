@@ -56,19 +56,19 @@ pub fn markdown(cases: &[Case], sound: &[Sound], command: &str) -> String {
          alone; `nothing_missing` above {NOTHING} times the floor; a run that does not end. *Not shown*: the error stays within \
          {SHOWN} times the floor and nothing false is said, since these data cannot show the mistake.\n\n"
     );
-    summary(&mut text, cases, sound);
+    write_summary(&mut text, cases, sound);
     for rig in Rig::ALL {
         let rows: Vec<&Case> = cases.iter().filter(|case| case.rig == rig).collect();
         if !rows.is_empty() {
             rows_of(&mut text, rig, &rows);
         }
     }
-    alarms(&mut text, sound);
+    write_alarms(&mut text, sound);
     text
 }
 
 // Writing to a string cannot fail.
-fn summary(text: &mut String, cases: &[Case], sound: &[Sound]) {
+fn write_summary(text: &mut String, cases: &[Case], sound: &[Sound]) {
     *text += "| rig | cases | cause reported | not shown | missed | false | cause right, of those shown |\n";
     *text += "|---|--:|--:|--:|--:|--:|--:|\n";
     let mut line = |name: &str, c: Counts| {
@@ -126,7 +126,7 @@ fn rows_of(text: &mut String, rig: Rig, rows: &[&Case]) {
     }
 }
 
-fn alarms(text: &mut String, sound: &[Sound]) {
+fn write_alarms(text: &mut String, sound: &[Sound]) {
     if sound.is_empty() {
         return;
     }

@@ -50,14 +50,14 @@ pub struct Answer {
 }
 
 /// The observations handed over as the pipeline would have made them, their noise declared so many times as large.
-pub fn quick(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidden>), ScoreError> {
+pub fn answer_observed(scenario: &Scenario, noise_factor: f64) -> Result<(Answer, Vec<Hidden>), ScoreError> {
     let observed = scenario.observe()?.declaring(noise_factor);
-    let (answer, _) = diagnosed(&observed.nominal, &observed.observations)?;
+    let (answer, _) = diagnose_observations(&observed.nominal, &observed.observations)?;
     Ok((answer, observed.truth.hidden))
 }
 
 /// What is told of observations of a nominal arm.
-pub(super) fn diagnosed(
+pub(super) fn diagnose_observations(
     nominal: &Nominal,
     observations: &[Observation],
 ) -> Result<(Answer, Diagnosis), ScoreError> {
@@ -81,30 +81,33 @@ pub(super) fn diagnosed(
     };
     let diagnosis = diagnose(&calibrated, &DiagnosisConfig::default())?;
     let seconds = begin.elapsed().as_secs_f64();
-    let answer = answer(&diagnosis, &calibrated)?;
+    let answer = answer_of_diagnosis(&diagnosis, &calibrated)?;
     Ok((Answer { seconds, calibration_seconds, ..answer }, diagnosis))
 }
 
 /// Recordings on disk and the whole pipeline; the truth lies in another folder and is read last.
-pub fn sealed(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), ScoreError> {
+pub fn answer_recorded(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), ScoreError> {
     let folder = |source| LabError::Folder { path: std::env::temp_dir(), source };
     let (open, closed) = (tempfile::tempdir().map_err(folder)?, tempfile::tempdir().map_err(folder)?);
     let place = seal(scenario, open.path(), &closed.path().join("truth.json"))?;
     let pipeline = Pipeline::load(&place.pipeline)?;
     let settled = armcal_pipeline::settle(&pipeline, &Silent)?;
     if let Some(mistake) = settled.setup.mistakes().next() {
-        let told = accused(&mistake.code, &settled.fitted.calibration);
-        return Ok((told, truth(&place.truth)?.hidden));
+        let told = answer_of_mistake(&mistake.code, &settled.fitted.calibration);
+        return Ok((told, read_truth(&place.truth)?.hidden));
     }
     let begin = std::time::Instant::now();
     let diagnosis = settled.diagnose(&pipeline, &Silent)?.ok_or(ScoreError::NotDiagnosed)?;
     let seconds = begin.elapsed().as_secs_f64();
     let of_geometry = Calibrated { model: &settled.fitted.geometry, ..settled.fitted.calibrated(&pipeline) };
-    Ok((Answer { seconds, ..answer(&diagnosis, &of_geometry)? }, truth(&place.truth)?.hidden))
+    Ok((
+        Answer { seconds, ..answer_of_diagnosis(&diagnosis, &of_geometry)? },
+        read_truth(&place.truth)?.hidden,
+    ))
 }
 
 /// A mistake of the setup that nobody made is a name, and wrong.
-fn accused(code: &str, calibration: &Calibration) -> Answer {
+fn answer_of_mistake(code: &str, calibration: &Calibration) -> Answer {
     let held_out_mm = calibration.judged().fitted.mean_m * 1e3;
     Answer {
         verdict: Verdict::Identified,
@@ -123,7 +126,7 @@ fn accused(code: &str, calibration: &Calibration) -> Answer {
     }
 }
 
-fn truth(path: &Path) -> Result<Truth, ScoreError> {
+fn read_truth(path: &Path) -> Result<Truth, ScoreError> {
     let text = input::read_to_string(path, input::Kind::Data).map_err(|source| ConfigError::ReadFile {
         what: "truth",
         path: path.to_owned(),
@@ -133,7 +136,7 @@ fn truth(path: &Path) -> Result<Truth, ScoreError> {
 }
 
 /// The answer to a diagnosis, and what its suggestion does to the held-out points.
-fn answer(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Result<Answer, ScoreError> {
+fn answer_of_diagnosis(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Result<Answer, ScoreError> {
     let Calibrated { model, calibration: before, observations, session, fit, holdout } = calibrated;
     let suggested = diagnosis.suggested(model.chain().joint_names())?;
     let after = match suggested.is_empty() {

@@ -54,7 +54,7 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
         };
     }
     if hidden.iter().all(Hidden::is_discrepancy) {
-        return displaced(answer);
+        return judge_displacement(answer);
     }
     let listed: Vec<&Hidden> = hidden.iter().filter(|h| h.effect.is_some()).collect();
     if answer.verdict == Verdict::NothingMissing {
@@ -62,11 +62,12 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
         return if shown { Judgement::Silent } else { Judgement::NotShown };
     }
     if listed.is_empty() {
-        return outside(answer, hidden);
+        return judge_unlisted(answer, hidden);
     }
-    let first =
-        |h: &&Hidden| answer.sets.iter().any(|set| set.first().is_some_and(|name| is(h, name, false)));
-    let within = |h: &&Hidden| answer.sets.iter().flatten().any(|name| is(h, name, true));
+    let first = |h: &&Hidden| {
+        answer.sets.iter().any(|set| set.first().is_some_and(|name| matches_name(h, name, false)))
+    };
+    let within = |h: &&Hidden| answer.sets.iter().flatten().any(|name| matches_name(h, name, true));
     let wrong = answer.sets.iter().filter(|set| !holds_truth(set, hidden)).count();
     let confident = answer.sets.iter().any(|set| set.len() == 1 && !holds_truth(set, hidden));
     if wrong == 0 && listed.iter().all(first) {
@@ -85,12 +86,12 @@ pub fn judge(answer: &Answer, hidden: &[Hidden]) -> Judgement {
 
 /// Whether one of the names is that of something hidden. That it may be something not listed is no name.
 pub(super) fn holds_truth(set: &[String], hidden: &[Hidden]) -> bool {
-    set.iter().any(|name| hidden.iter().any(|h| is(h, name, true)))
+    set.iter().any(|name| hidden.iter().any(|h| matches_name(h, name, true)))
 }
 
 /// Of a smooth displacement, which nothing listed is: any listed name is wrong, that something unlisted or unexplained is
 /// left is right, and that nothing is missing is right only as long as the errors are near the floor.
-fn displaced(answer: &Answer) -> Judgement {
+fn judge_displacement(answer: &Answer) -> Judgement {
     if answer.sets.iter().flatten().any(|name| name != NOT_LISTED) {
         return Judgement::Wrong;
     }
@@ -100,7 +101,7 @@ fn displaced(answer: &Answer) -> Judgement {
     }
 }
 
-fn outside(answer: &Answer, hidden: &[Hidden]) -> Judgement {
+fn judge_unlisted(answer: &Answer, hidden: &[Hidden]) -> Judgement {
     let form = |name: &String| hidden.iter().flat_map(|h| &h.alike).any(|truth| same_effect(truth, name));
     let mut names = answer.sets.iter().flatten().filter(|name| *name != NOT_LISTED);
     if !answer.sets.is_empty() && names.all(form) {
@@ -121,7 +122,7 @@ fn outside(answer: &Answer, hidden: &[Hidden]) -> Judgement {
 }
 
 /// Whether a name is the hidden effect's, or one that is the same to the data; `alike` also takes what nearly is.
-fn is(hidden: &Hidden, name: &str, alike: bool) -> bool {
+fn matches_name(hidden: &Hidden, name: &str, alike: bool) -> bool {
     let mut right: Vec<&String> = hidden.effect.iter().chain(&hidden.same).collect();
     if alike {
         right.extend(&hidden.alike);

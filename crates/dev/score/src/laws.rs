@@ -3,7 +3,7 @@
 //! `Scenario -> as it is, noise declared otherwise, readings in another order, half of the dwells -> asked -> Laws -> page`. None of
 //! them reads the truth.
 
-use super::case::diagnosed;
+use super::case::diagnose_observations;
 use super::interval::Share;
 use super::{Answer, NOT_LISTED};
 use crate::error::ScoreError;
@@ -94,7 +94,7 @@ impl Laws {
 }
 
 /// Asks every law of scenarios, in parallel; `done` is told of each one.
-pub fn laws(scenarios: &[Scenario], done: &(dyn Fn() + Sync)) -> Result<Laws, ScoreError> {
+pub fn check_laws(scenarios: &[Scenario], done: &(dyn Fn() + Sync)) -> Result<Laws, ScoreError> {
     let of = |scenario: &Scenario| {
         let laws = of_one(scenario)?;
         done();
@@ -108,34 +108,47 @@ fn of_one(scenario: &Scenario) -> Result<Laws, ScoreError> {
     let seen = scenario.observe()?;
     let name = format!("`{}`, seed {}", scenario.family, scenario.seed);
     let mut laws = Laws::default();
-    let (answer, diagnosis) = diagnosed(&seen.nominal, &seen.observations)?;
+    let (answer, diagnosis) = diagnose_observations(&seen.nominal, &seen.observations)?;
     of_rows(&mut laws, &diagnosis, &name);
     for factor in NOISE {
         let declared = seen.clone().declaring(factor);
-        let (other, _) = diagnosed(&declared.nominal, &declared.observations)?;
+        let (other, _) = diagnose_observations(&declared.nominal, &declared.observations)?;
         if answer.before_mm > answer.floor_mm.max(other.floor_mm) {
-            let same = || format!("{name}, noise x {factor}: {} instead of {}", told(&other), told(&answer));
-            laws.ask("noise is no judge", within(&other, &answer) && within(&answer, &other), same);
+            let same = || {
+                format!(
+                    "{name}, noise x {factor}: {} instead of {}",
+                    sets_or_verdict(&other),
+                    sets_or_verdict(&answer)
+                )
+            };
+            laws.ask(
+                "noise is no judge",
+                is_covered_by(&other, &answer) && is_covered_by(&answer, &other),
+                same,
+            );
         }
     }
     let mut turned = seen.observations.clone();
     turned.reverse();
-    let (other, _) = diagnosed(&seen.nominal, &turned)?;
+    let (other, _) = diagnose_observations(&seen.nominal, &turned)?;
     let same = other.verdict == answer.verdict && other.names == answer.names;
-    laws.ask("relabelling", same, || format!("{name}: {} instead of {}", told(&other), told(&answer)));
-    let (half, _) = diagnosed(&seen.nominal, &half(&seen.observations, scenario.seed))?;
+    laws.ask("relabelling", same, || {
+        format!("{name}: {} instead of {}", sets_or_verdict(&other), sets_or_verdict(&answer))
+    });
+    let (half, _) = diagnose_observations(&seen.nominal, &half_of_dwells(&seen.observations, scenario.seed))?;
     if !half.sets.is_empty() {
         let refuted: Vec<&str> = half.sets.iter().map(|set| set[0].as_str()).collect();
         let refuted: Vec<&str> =
             refuted.into_iter().filter(|name| is_refuted(name, &answer, &diagnosis)).collect();
-        let what = || format!("{name}: half named {}, all of them {}", refuted.join(", "), told(&answer));
+        let what =
+            || format!("{name}: half named {}, all of them {}", refuted.join(", "), sets_or_verdict(&answer));
         laws.ask("more is not less", refuted.is_empty(), what);
     }
     for set in &answer.sets {
         let own: BTreeSet<&str> = causes(set);
         let holds = half.sets.iter().map(|other| causes(other)).filter(|other| !other.is_disjoint(&own));
         for other in holds {
-            let what = || format!("{name}: {} of half, {} of all", listed(&other), listed(&own));
+            let what = || format!("{name}: {} of half, {} of all", join_names(&other), join_names(&own));
             laws.ask("less holds more", own.is_subset(&other), what);
         }
     }
@@ -166,7 +179,7 @@ fn of_rows(laws: &mut Laws, d: &Diagnosis, name: &str) {
 }
 
 /// Whether every effect that an answer names first is of a set of the other one.
-fn within(answer: &Answer, other: &Answer) -> bool {
+fn is_covered_by(answer: &Answer, other: &Answer) -> bool {
     let all: BTreeSet<&str> = other.sets.iter().flat_map(|set| causes(set)).collect();
     answer.sets.iter().all(|set| causes(&set[..1]).is_subset(&all))
 }
@@ -188,7 +201,7 @@ fn causes(set: &[String]) -> BTreeSet<&str> {
 }
 
 /// Half of the dwells, drawn.
-fn half(observations: &[Observation], seed: u64) -> Vec<Observation> {
+fn half_of_dwells(observations: &[Observation], seed: u64) -> Vec<Observation> {
     let mut dwells: Vec<DwellId> = observations.iter().map(|o| o.dwell).collect();
     dwells.dedup();
     dwells.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
@@ -196,11 +209,11 @@ fn half(observations: &[Observation], seed: u64) -> Vec<Observation> {
     observations.iter().filter(|o| kept.contains(&o.dwell)).cloned().collect()
 }
 
-fn told(answer: &Answer) -> String {
+fn sets_or_verdict(answer: &Answer) -> String {
     let sets: Vec<String> = answer.sets.iter().map(|set| set.join("|")).collect();
     if sets.is_empty() { answer.verdict.word().to_owned() } else { sets.join(" + ") }
 }
 
-fn listed(names: &BTreeSet<&str>) -> String {
+fn join_names(names: &BTreeSet<&str>) -> String {
     names.iter().copied().collect::<Vec<_>>().join("|")
 }

@@ -16,13 +16,13 @@ mod page;
 mod reliability;
 mod table;
 
-pub use case::{Answer, nominal_model, quick, sealed};
+pub use case::{Answer, answer_observed, answer_recorded, nominal_model};
 pub use error::ScoreError;
 pub use judge::{Judgement, judge};
-pub use laws::{Laws, laws};
-pub use page::{Campaign, page};
+pub use laws::{Laws, check_laws};
+pub use page::{Campaign, confusion_page};
 pub use reliability::Reliability;
-pub use table::{Row, rows, table};
+pub use table::{Row, family_rows, terminal_table};
 
 use armcal_diagnose::NOT_LISTED;
 use armcal_lab::scenario::{Hidden, Scenario};
@@ -55,13 +55,17 @@ pub enum Way {
 }
 
 /// Runs scenarios in parallel, in their order; `done` is told of each one.
-pub fn score(scenarios: &[Scenario], way: Way, done: &(dyn Fn() + Sync)) -> Result<Vec<Scored>, ScoreError> {
+pub fn score_scenarios(
+    scenarios: &[Scenario],
+    way: Way,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Scored>, ScoreError> {
     scenarios
         .par_iter()
         .map(|scenario| {
             let (answer, hidden) = match way {
-                Way::Observed { noise_factor } => quick(scenario, noise_factor)?,
-                Way::Recorded => sealed(scenario)?,
+                Way::Observed { noise_factor } => answer_observed(scenario, noise_factor)?,
+                Way::Recorded => answer_recorded(scenario)?,
             };
             let judgement = judge(&answer, &hidden);
             done();

@@ -4,11 +4,11 @@ use super::interval::Share;
 use super::judge::NEAR_FLOOR;
 use super::{Judgement, Scored};
 use armcal_diagnose::Verdict;
-use armcal_lab::scenario::{Hidden, nothing};
+use armcal_lab::scenario::{Hidden, null_families};
 use std::fmt::Write as _;
 
 /// What was said where nothing listed was hidden, for each kind of noise.
-pub(super) fn table(scored: &[Scored]) -> String {
+pub(super) fn table_by_noise(scored: &[Scored]) -> String {
     let mut text = String::from(
         "| noise | n | wrong (95 %) | named | unknown | unexplained | silent |\n|---|---|---|---|---|---|---|\n",
     );
@@ -27,10 +27,10 @@ pub(super) fn table(scored: &[Scored]) -> String {
             count(&|s| s.judgement == Judgement::Silent),
         );
     };
-    for family in nothing() {
+    for family in null_families() {
         let own: Vec<&Scored> = scored.iter().filter(|s| s.scenario.family == family).collect();
         if !own.is_empty() {
-            line(noise(family), &own);
+            line(noise_description(family), &own);
         }
     }
     line("all", &scored.iter().collect::<Vec<_>>());
@@ -45,7 +45,7 @@ pub(super) fn table(scored: &[Scored]) -> String {
     text
 }
 
-fn noise(family: &str) -> &str {
+fn noise_description(family: &str) -> &str {
     match family {
         "nothing" => "as declared",
         "nothing:white" => "no cavity tolerance",

@@ -2,8 +2,8 @@
 
 use super::interval::Share;
 use super::judge::{AT_FLOOR, DWELLS};
-use super::table::{JUDGEMENTS, said};
-use super::{Judgement, Reliability, Row, Scored, nothing, rows};
+use super::table::{JUDGEMENTS, describe_answer};
+use super::{Judgement, Reliability, Row, Scored, family_rows, nothing};
 use armcal_lab::scenario;
 use armcal_result::VERSION;
 use std::fmt::Write as _;
@@ -34,20 +34,20 @@ enum Kind {
     Nothing,
 }
 
-fn kind(family: &str) -> Kind {
+fn kind_of_family(family: &str) -> Kind {
     match family {
         _ if family.contains('+') => Kind::Together,
-        _ if scenario::nothing().contains(&family) => Kind::Nothing,
-        _ if scenario::outside().contains(&family) => Kind::Outside,
+        _ if scenario::null_families().contains(&family) => Kind::Nothing,
+        _ if scenario::uncatalogued_families().contains(&family) => Kind::Outside,
         _ => Kind::Listed,
     }
 }
 
 /// The page as Markdown. The same campaign gives the same bytes.
-pub fn page(campaign: &Campaign<'_>) -> String {
+pub fn confusion_page(campaign: &Campaign<'_>) -> String {
     let mut text = introduction(campaign);
     let of = |wanted: Kind| -> Vec<Scored> {
-        campaign.scored.iter().filter(|s| kind(&s.scenario.family) == wanted).cloned().collect()
+        campaign.scored.iter().filter(|s| kind_of_family(&s.scenario.family) == wanted).cloned().collect()
     };
     let sections = [
         ("In the catalogue", of(Kind::Listed)),
@@ -56,7 +56,12 @@ pub fn page(campaign: &Campaign<'_>) -> String {
         ("The whole way", campaign.whole_way.to_vec()),
     ];
     for (title, scored) in sections.iter().filter(|(_, scored)| !scored.is_empty()) {
-        let _ = write!(text, "\n## {title}\n\n{}\n{}", table(&rows(scored)), shares(scored));
+        let _ = write!(
+            text,
+            "\n## {title}\n\n{}\n{}",
+            markdown_table(&family_rows(scored)),
+            section_totals(scored)
+        );
         if *title == "The whole way" {
             text += "\nThese scenarios were written as recordings, read back, and run as a pipeline: clocks, dwells, cavities, \
                      calibration, diagnosis.\n";
@@ -64,14 +69,14 @@ pub fn page(campaign: &Campaign<'_>) -> String {
     }
     let silent = of(Kind::Nothing);
     if !silent.is_empty() {
-        let _ = write!(text, "\n## Nothing hidden\n\n{}", nothing::table(&silent));
+        let _ = write!(text, "\n## Nothing hidden\n\n{}", nothing::table_by_noise(&silent));
     }
     let told = Reliability::of(campaign.scored.iter().chain(campaign.whole_way));
-    text + &told.section() + &misses(campaign)
+    text + &told.section() + &misses_section(campaign)
 }
 
 fn introduction(campaign: &Campaign<'_>) -> String {
-    let (n, seeds) = (campaign.scored.len() + campaign.whole_way.len(), seeds(campaign));
+    let (n, seeds) = (campaign.scored.len() + campaign.whole_way.len(), seed_range(campaign));
     let declared = match campaign.noise_factor {
         1.0 => String::new(),
         factor => format!(
@@ -99,7 +104,7 @@ fn introduction(campaign: &Campaign<'_>) -> String {
     )
 }
 
-fn seeds(campaign: &Campaign<'_>) -> String {
+fn seed_range(campaign: &Campaign<'_>) -> String {
     let all = campaign.scored.iter().chain(campaign.whole_way).map(|s| s.scenario.seed);
     match (all.clone().min(), all.max()) {
         (Some(first), Some(last)) => format!("seeds {first} to {last}"),
@@ -108,7 +113,7 @@ fn seeds(campaign: &Campaign<'_>) -> String {
 }
 
 /// One row a family; of the judgements, the columns that are not empty.
-fn table(rows: &[Row]) -> String {
+fn markdown_table(rows: &[Row]) -> String {
     let used: Vec<usize> =
         (0..JUDGEMENTS.len()).filter(|k| rows.iter().any(|row| row.counts[*k] > 0)).collect();
     let designs = rows.iter().any(|row| row.design != rows[0].design);
@@ -138,7 +143,7 @@ fn table(rows: &[Row]) -> String {
 }
 
 /// The sums of a section.
-fn shares(scored: &[Scored]) -> String {
+fn section_totals(scored: &[Scored]) -> String {
     let share = |judgements: &[Judgement]| {
         let k = scored.iter().filter(|s| judgements.contains(&s.judgement)).count();
         (k, Share { k, n: scored.len() }.words())
@@ -160,7 +165,7 @@ fn shares(scored: &[Scored]) -> String {
 }
 
 /// Every scenario that was not answered rightly, with what was said.
-fn misses(campaign: &Campaign<'_>) -> String {
+fn misses_section(campaign: &Campaign<'_>) -> String {
     let quick = campaign.scored.iter().map(|s| ("", s));
     let whole = campaign.whole_way.iter().map(|s| (" (whole way)", s));
     let unfound = quick.chain(whole).filter(|(_, s)| !FOUND.contains(&s.judgement));
@@ -191,7 +196,7 @@ fn misses(campaign: &Campaign<'_>) -> String {
             s.scenario.family,
             s.scenario.seed,
             hidden.join(" + "),
-            said(a).replace('|', " or "),
+            describe_answer(a).replace('|', " or "),
             a.before_mm / a.floor_mm,
             a.after_mm / a.floor_mm,
         );
@@ -201,7 +206,7 @@ fn misses(campaign: &Campaign<'_>) -> String {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::{Campaign, page};
+    use super::{Campaign, confusion_page};
     use crate::{Answer, Judgement, Scored};
     use armcal_diagnose::Verdict;
     use armcal_lab::scenario::{Design, Hidden, Scenario};
@@ -261,7 +266,7 @@ pub(super) mod tests {
         let whole = [scored("backlash", 1, Judgement::First, &[&["backlash:2"]])];
         let command = "armcal-dev score all".to_owned();
         let campaign = Campaign { command, scored: &all, whole_way: &whole, noise_factor: 0.1 };
-        let text = page(&campaign);
+        let text = confusion_page(&campaign);
         let sections: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
         assert_eq!(
             sections,
@@ -301,14 +306,14 @@ pub(super) mod tests {
         for line in expected {
             assert!(lines.any(|l| l == line), "not there, or not in this order: {line}\n{text}");
         }
-        assert_eq!(text, page(&campaign));
+        assert_eq!(text, confusion_page(&campaign));
     }
 
     #[test]
     fn without_a_miss_the_page_says_so() {
         let all = [scored("backlash", 5, Judgement::First, &[&["backlash:2"]])];
         let campaign = Campaign { command: String::new(), scored: &all, whole_way: &[], noise_factor: 1.0 };
-        let text = page(&campaign);
+        let text = confusion_page(&campaign);
         assert!(text.ends_with("Missed or answered wrongly: 0.\n"), "{text}");
         assert!(!text.contains("is declared"));
         assert!(!text.contains("Nothing hidden") && !text.contains("The whole way"));

@@ -4,7 +4,7 @@ use super::judge::AT_FLOOR;
 use super::{Answer, Judgement, Scored};
 use armcal_core::robust::median;
 use armcal_diagnose::Verdict;
-use armcal_report::{number, plain_table, table_text};
+use armcal_report::{number_cell, plain_table, table_text};
 use comfy_table::Cell;
 use serde::Serialize;
 
@@ -47,28 +47,28 @@ pub const JUDGEMENTS: [(Judgement, &str); 11] = [
 ];
 
 /// One row a family and design, in the order in which they come.
-pub fn rows(scored: &[Scored]) -> Vec<Row> {
+pub fn family_rows(scored: &[Scored]) -> Vec<Row> {
     let mut keys: Vec<(String, String)> = Vec::new();
     for s in scored {
-        let key = key(s);
+        let key = family_and_design(s);
         if !keys.contains(&key) {
             keys.push(key);
         }
     }
     keys.into_iter()
         .map(|k| {
-            let own: Vec<&Scored> = scored.iter().filter(|s| key(s) == k).collect();
-            row(k, &own)
+            let own: Vec<&Scored> = scored.iter().filter(|s| family_and_design(s) == k).collect();
+            family_row(k, &own)
         })
         .collect()
 }
 
-fn key(s: &Scored) -> (String, String) {
+fn family_and_design(s: &Scored) -> (String, String) {
     let design = serde_json::to_value(s.scenario.design).unwrap_or_default();
     (s.scenario.family.clone(), design.as_str().unwrap_or_default().to_owned())
 }
 
-fn row((family, design): (String, String), own: &[&Scored]) -> Row {
+fn family_row((family, design): (String, String), own: &[&Scored]) -> Row {
     let ratio =
         |mm: fn(&Scored) -> f64| median(&own.iter().map(|s| mm(s) / s.answer.floor_mm).collect::<Vec<_>>());
     let removed: Vec<f64> = own
@@ -83,7 +83,7 @@ fn row((family, design): (String, String), own: &[&Scored]) -> Row {
     let right = [Judgement::RightlySilent, Judgement::First, Judgement::Placed];
     let mut instead: Vec<(String, usize)> = Vec::new();
     for s in own.iter().filter(|s| !right.contains(&s.judgement)) {
-        let words = said(&s.answer);
+        let words = describe_answer(&s.answer);
         match instead.iter_mut().find(|(w, _)| *w == words) {
             Some((_, n)) => *n += 1,
             None => instead.push((words, 1)),
@@ -104,7 +104,7 @@ fn row((family, design): (String, String), own: &[&Scored]) -> Row {
 }
 
 /// An answer in a few words: the sets of names, else where the unlisted enters, else the verdict alone.
-pub(super) fn said(answer: &Answer) -> String {
+pub(super) fn describe_answer(answer: &Answer) -> String {
     match (&answer.unknown, answer.sets.is_empty()) {
         (Some((channel, driver)), true) => format!("{channel} <- {driver}"),
         (None, true) if answer.verdict == Verdict::NothingMissing => "nothing".to_owned(),
@@ -114,7 +114,7 @@ pub(super) fn said(answer: &Answer) -> String {
 }
 
 /// The rows as text.
-pub fn table(rows: &[Row]) -> String {
+pub fn terminal_table(rows: &[Row]) -> String {
     let used: Vec<usize> =
         (0..JUDGEMENTS.len()).filter(|k| rows.iter().any(|row| row.counts[*k] > 0)).collect();
     let mut table = plain_table();
@@ -123,12 +123,12 @@ pub fn table(rows: &[Row]) -> String {
     header.extend(["before/floor", "after/floor", "at floor", "removed", "instead"].map(str::to_owned));
     table.set_header(header);
     for row in rows {
-        let mut cells = vec![Cell::new(&row.family), Cell::new(&row.design), number(row.n.to_string())];
-        cells.extend(used.iter().map(|k| number(row.counts[*k].to_string())));
-        cells.push(number(format!("{:.2}", row.before)));
-        cells.push(number(format!("{:.2}", row.after)));
-        cells.push(number(format!("{:.0} %", 100.0 * row.at_floor)));
-        cells.push(number(if row.removed.is_nan() {
+        let mut cells = vec![Cell::new(&row.family), Cell::new(&row.design), number_cell(row.n.to_string())];
+        cells.extend(used.iter().map(|k| number_cell(row.counts[*k].to_string())));
+        cells.push(number_cell(format!("{:.2}", row.before)));
+        cells.push(number_cell(format!("{:.2}", row.after)));
+        cells.push(number_cell(format!("{:.0} %", 100.0 * row.at_floor)));
+        cells.push(number_cell(if row.removed.is_nan() {
             "-".to_owned()
         } else {
             format!("{:.0} %", 100.0 * row.removed)

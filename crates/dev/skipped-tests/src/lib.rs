@@ -24,7 +24,7 @@ pub fn skip(reason: &str) {
     {
         eprintln!("SKIPPED: {}", note.reason);
     }
-    let noted = folder().and_then(|folder| note.write(&folder, &run()));
+    let noted = notes_folder().and_then(|folder| note.write(&folder, &run_name()));
     if let Err(e) = noted {
         panic!("noting that {} is skipped ({}): {e}", note.test, note.reason);
     }
@@ -57,7 +57,7 @@ impl Note {
 ///
 /// # Errors
 /// A folder that cannot be read, or notes that cannot be removed.
-pub fn take(folder: &Path, run: &str) -> Result<Vec<Note>> {
+pub fn take_notes(folder: &Path, run: &str) -> Result<Vec<Note>> {
     let mut notes = Vec::new();
     let entries = match std::fs::read_dir(folder) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(notes),
@@ -85,7 +85,7 @@ pub fn take(folder: &Path, run: &str) -> Result<Vec<Note>> {
 }
 
 /// The list for people: `skipped: N`, then each reason with the tests that it kept from running.
-pub fn list(notes: &[Note]) -> String {
+pub fn list_notes(notes: &[Note]) -> String {
     let mut by_reason: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for note in notes {
         by_reason.entry(&note.reason).or_default().push(&note.test);
@@ -102,7 +102,7 @@ pub fn list(notes: &[Note]) -> String {
 ///
 /// # Errors
 /// A process that does not know its own file.
-pub fn folder() -> Result<PathBuf> {
+pub fn notes_folder() -> Result<PathBuf> {
     let binary = std::env::current_exe()?;
     // target/debug/deps/<binary>
     let build = binary.parent().and_then(Path::parent).unwrap_or(Path::new("."));
@@ -111,7 +111,7 @@ pub fn folder() -> Result<PathBuf> {
 
 /// Names the run that started this process: its process, and where the system tells, when that started, because numbers of
 /// processes come again.
-pub fn run() -> String {
+pub fn run_name() -> String {
     let parent = parent();
     let stat = std::fs::read_to_string(format!("/proc/{parent}/stat")).unwrap_or_default();
     // proc(5): after the command in brackets, the 20th field is the start time.
@@ -153,7 +153,7 @@ fn one_line(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Note, list, run, take};
+    use super::{Note, list_notes, run_name, take_notes};
 
     fn note(test: &str, reason: &str) -> Note {
         Note { test: test.to_owned(), reason: reason.to_owned() }
@@ -167,10 +167,10 @@ mod tests {
         for n in [note("b", "no Slurm"), note("a", "no Python"), note("b", "no Slurm")] {
             n.write(&path, "2-1").expect("written");
         }
-        let notes = take(&path, "2-1").expect("read");
+        let notes = take_notes(&path, "2-1").expect("read");
         assert_eq!(notes, [note("a", "no Python"), note("b", "no Slurm")]);
-        assert_eq!(list(&notes), "skipped: 2\n  no Python\n    a\n  no Slurm\n    b\n");
-        assert!(take(&path, "2-1").expect("read").is_empty());
+        assert_eq!(list_notes(&notes), "skipped: 2\n  no Python\n    a\n  no Slurm\n    b\n");
+        assert!(take_notes(&path, "2-1").expect("read").is_empty());
         assert_eq!(std::fs::read_dir(&path).expect("the folder").count(), 0);
     }
 
@@ -187,28 +187,28 @@ mod tests {
                 });
             }
         });
-        assert_eq!(take(folder.path(), "r").expect("read").len(), 400);
+        assert_eq!(take_notes(folder.path(), "r").expect("read").len(), 400);
     }
 
     #[test]
     #[cfg(target_os = "linux")]
     fn notes_of_a_run_beside_this_one_stay() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        note("theirs", "no Python").write(folder.path(), &run()).expect("written");
-        assert!(take(folder.path(), "999999999-1").expect("read").is_empty());
-        assert_eq!(take(folder.path(), &run()).expect("read"), [note("theirs", "no Python")]);
+        note("theirs", "no Python").write(folder.path(), &run_name()).expect("written");
+        assert!(take_notes(folder.path(), "999999999-1").expect("read").is_empty());
+        assert_eq!(take_notes(folder.path(), &run_name()).expect("read"), [note("theirs", "no Python")]);
     }
 
     #[test]
     fn without_a_folder_nothing_was_skipped() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        assert!(take(&folder.path().join("none"), "r").expect("nothing").is_empty());
-        assert_eq!(list(&[]), "skipped: 0\n");
+        assert!(take_notes(&folder.path().join("none"), "r").expect("nothing").is_empty());
+        assert_eq!(list_notes(&[]), "skipped: 0\n");
     }
 
     #[test]
     fn all_tests_of_a_process_are_of_one_run() {
-        let other = std::thread::spawn(run).join().expect("a name");
-        assert_eq!(run(), other);
+        let other = std::thread::spawn(run_name).join().expect("a name");
+        assert_eq!(run_name(), other);
     }
 }

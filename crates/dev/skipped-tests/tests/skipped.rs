@@ -3,7 +3,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is its purpose")]
 
-use skipped_tests::{folder, list, run, take};
+use skipped_tests::{list_notes, notes_folder, run_name, take_notes};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -11,8 +11,8 @@ fn main() -> ExitCode {
     if std::env::args().any(|argument| argument == "--list") {
         return ExitCode::SUCCESS;
     }
-    let listed = folder().and_then(|folder| {
-        let text = list(&take(&folder, &run())?);
+    let listed = notes_folder().and_then(|folder| {
+        let text = list_notes(&take_notes(&folder, &run_name())?);
         // For those who print it again at the end of a longer run.
         std::fs::write(folder.with_extension("txt"), &text)?;
         Ok(text)

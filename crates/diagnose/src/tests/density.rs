@@ -141,7 +141,9 @@ fn a_group_is_judged_by_the_size_of_the_others() {
     let [at, now] = [&before, &after].map(Kind::sizes_by_others);
     assert_eq!(at[0], now[0], "its own errors say nothing of its size");
     assert!((1..16).all(|g| now[g] > at[g]), "it says something of theirs: {at:?} {now:?}");
-    let errors = groups[0].iter().map(|i| axes(&p.dwells[*i].parts[0], &wild.rows(3 * i, 3).into_owned()));
+    let errors = groups[0]
+        .iter()
+        .map(|i| principal_axis_errors(&p.dwells[*i].parts[0], &wild.rows(3 * i, 3).into_owned()));
     let by_hand = ln_density(&errors.collect::<Vec<_>>(), before.sizes[at[0]]);
     assert!((ln_by_group(&p, &wild, &groups)[0] - by_hand).abs() < 1e-9);
 }
@@ -240,6 +242,6 @@ fn a_direction_that_was_not_measured_says_nothing() {
     let mut else_there = rows.clone();
     (0..p.dwells.len()).for_each(|i| else_there[3 * i + 2] = 1e6);
     assert_eq!(seen, ln_by_group(&p, &else_there, &groups));
-    assert_eq!(axes(&p.dwells[0].parts[0], &rows.rows(0, 3).into_owned()).len(), 2);
+    assert_eq!(principal_axis_errors(&p.dwells[0].parts[0], &rows.rows(0, 3).into_owned()).len(), 2);
     assert!(Kind::of(&p, &rows, &groups, true).is_none(), "nothing is tracked");
 }

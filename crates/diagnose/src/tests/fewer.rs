@@ -28,7 +28,7 @@ fn left(p: &Problem, specs: &[&str]) -> Vec<String> {
                 ranked,
             });
         }
-        fewer(conditioned_problems, Found { accepted, may_be_shape: false }, &config)
+        merge_names(conditioned_problems, Found { accepted, may_be_shape: false }, &config)
     });
     let mut names: Vec<String> = found.unwrap().accepted.iter().map(|a| a.candidate.spec.clone()).collect();
     names.sort();

@@ -90,7 +90,7 @@ fn of_what_is_refused_that_leaves_which_says_least() {
 fn what_says_less_than_a_hundredth_of_another_one_is_a_detail_of_it() {
     let of = |nats: &[f64]| {
         let all: Vec<(Grade, f64)> = nats.iter().map(|n| (Grade::Named, *n)).collect();
-        of_judged(&all, |judged| detail(judged, &quick()))
+        of_judged(&all, |judged| find_shape_detail(judged, &quick()))
     };
     assert_eq!(of(&[20.0, 1000.0, 9.9, 3.0]), Some(2));
     assert_eq!(of(&[20.0, 1000.0, 10.0]), None);
@@ -246,8 +246,10 @@ fn of_two_that_hide_each_other_the_weaker_leaves() {
 }
 
 fn stepped(p: &Problem, known: Vec<Step>, config: &DiagnosisConfig) -> (Vec<Step>, bool) {
-    with_conditioned(p, config, |conditioned_problems| forward(conditioned_problems, known, &[], config))
-        .unwrap()
+    with_conditioned(p, config, |conditioned_problems| {
+        forward_selection(conditioned_problems, known, &[], config)
+    })
+    .unwrap()
 }
 
 #[test]
@@ -263,7 +265,7 @@ fn forward_steps_end_when_nothing_is_left_or_enough_were_found() {
     // What stands in the base already is not found again.
     let shapes = [own(&p, "backlash:1")];
     let (steps, _) = with_conditioned(&p, &config, |conditioned_problems| {
-        forward(conditioned_problems, Vec::new(), &shapes, &config)
+        forward_selection(conditioned_problems, Vec::new(), &shapes, &config)
     })
     .unwrap();
     assert_eq!(names(&steps), ["zero_drift:2"]);
@@ -351,7 +353,7 @@ fn only_what_has_no_name_at_once_is_tried_at_its_own_size() {
         let first = (p.clone(), weigh(&p, config));
         let mut conditioned_problems =
             ConditionedProblems::new(&mut refit, vec![true; p.dwells.len()], first, config);
-        let (steps, _) = forward(&mut conditioned_problems, Vec::new(), &[], config).unwrap();
+        let (steps, _) = forward_selection(&mut conditioned_problems, Vec::new(), &[], config).unwrap();
         (refit.asked, steps.len())
     };
     assert_eq!(asked(&quick()), (vec![], 1));

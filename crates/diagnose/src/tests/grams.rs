@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::columns::Cut;
-use crate::evidence::projected;
+use crate::evidence::project_out_geometry;
 use crate::problem::Candidate;
 use crate::tests::planted;
 
@@ -47,7 +47,7 @@ fn products_weigh_as_what_they_stand_for() {
     });
     let forms = forms(&problem);
     let terms: Vec<&Columns> = forms.iter().collect();
-    let base = projected(&problem, 1.3);
+    let base = project_out_geometry(&problem, 1.3);
     let mut seen = 0;
     each_gram(&terms, &problem, 1.0 / 1.3, &base, &mut |k, found| {
         let whole = base.gram(&terms[k].dense(&problem.dwells, 1.0 / 1.3));

@@ -25,7 +25,7 @@ fn searched(p: &Problem) -> Search {
     let config = quick();
     with_conditioned(p, &config, |conditioned_problems| {
         let mut found = search(conditioned_problems, &[], &config)?;
-        settle(&mut found, conditioned_problems, &config)?;
+        resolve_names(&mut found, conditioned_problems, &config)?;
         Ok::<_, DiagnoseError>(found)
     })
     .unwrap()
@@ -153,7 +153,7 @@ fn alike_signatures_are_listed_as_pairs() {
     let mut p = planted(&[("backlash:1", 1.0)], 0, 3);
     let all = |p: &Problem| {
         let r = conditioned(p, &config);
-        confused(&r.problem, &r.weighed, &config)
+        confusable_pairs(&r.problem, &r.weighed, &config)
     };
     assert!(!all(&p).iter().any(|pair| pair.contains(&"backlash:1".to_string())));
     let a = own(&p, "backlash:1");

@@ -249,7 +249,7 @@ fn an_estimate_is_as_uncertain_as_its_covariance_along_itself() {
         never_negative,
     };
     let all = [amplitude("spring", true), amplitude("phase", false)];
-    let names = |a: f64, b: f64| impossible(&all, &of(&[a, b], &[0.25, 0.25]), 4.0);
+    let names = |a: f64, b: f64| negative_amplitudes(&all, &of(&[a, b], &[0.25, 0.25]), 4.0);
     assert!(names(-1.9, -9.0).is_empty() && names(3.0, -9.0).is_empty());
     assert_eq!(names(-2.0, 0.0), ["spring"]);
 }

@@ -41,7 +41,7 @@ fn the_square_is_that_of_the_left_out_error_in_its_own_covariance() {
     p.residual[0] += 3.0;
     let alone: Vec<Group> = (0..p.dwells.len()).map(|i| vec![i].into()).collect();
     let left = left_out(&p, None, &alone, 1.0);
-    let square = studentised(&p, &left, &left_out(&p, None, &[], 1.0));
+    let square = studentised_squares(&p, &left, &left_out(&p, None, &[], 1.0));
     let precision = DMatrix::from_diagonal(&p.geometry_precision);
     for i in [0, 17, 100, 197] {
         let x = p.geometry.rows(3 * i, 3);
@@ -76,7 +76,7 @@ fn an_error_is_suspect_from_the_declared_rarity_on_whatever_the_noise() {
             let best = weighed.best().filter(|b| b.1 > 0.0).map(|b| weighed.regularised(b.0, &p, &config()));
             let alone: Vec<Group> = (0..p.dwells.len()).map(|i| vec![i].into()).collect();
             let left = left_out(&p, best.as_ref(), &alone, weighed.scale);
-            let square = studentised(&p, &left, &left_out(&p, best.as_ref(), &[], weighed.scale));
+            let square = studentised_squares(&p, &left, &left_out(&p, best.as_ref(), &[], weighed.scale));
             let ratio = square[at] * 2.38 / median(&square);
             if (ratio / RARE - 1.0).abs() < 0.03 {
                 continue;
@@ -168,12 +168,12 @@ fn the_share_counts_all_rounds() {
     let n = p.dwells.len();
     let found = |from: usize, count: usize| (0..count).map(|k| from + 2 * k).collect::<Vec<_>>();
     let none = vec![true; n];
-    assert_eq!(accidents(&p, &none, found(0, 19)).len(), 19);
-    assert!(accidents(&p, &none, found(0, 20)).is_empty(), "20 of 198 are more than a tenth");
+    assert_eq!(plausible_outliers(&p, &none, found(0, 19)).len(), 19);
+    assert!(plausible_outliers(&p, &none, found(0, 20)).is_empty(), "20 of 198 are more than a tenth");
     let mut before = none;
     found(1, 10).into_iter().for_each(|i| before[i] = false);
-    assert_eq!(accidents(&p, &before, found(100, 9)).len(), 9);
-    assert!(accidents(&p, &before, found(100, 10)).is_empty());
+    assert_eq!(plausible_outliers(&p, &before, found(100, 9)).len(), 9);
+    assert!(plausible_outliers(&p, &before, found(100, 10)).is_empty());
 }
 
 #[test]
@@ -191,11 +191,11 @@ fn what_alone_shows_a_cause_is_kept() {
     for change in changes {
         let mut p = base.clone();
         p.dwells.iter_mut().enumerate().for_each(|(i, d)| change(d, alone.contains(&i)));
-        assert_eq!(needed(&p, &suspects), alone.into());
+        assert_eq!(needed_for_variance(&p, &suspects), alone.into());
         let keep = vec![true; p.dwells.len()];
-        assert_eq!(accidents(&p, &keep, suspects.iter().copied().collect()), [accident]);
+        assert_eq!(plausible_outliers(&p, &keep, suspects.iter().copied().collect()), [accident]);
     }
-    assert!(needed(&base, &suspects).is_empty(), "the rest shows it too");
+    assert!(needed_for_variance(&base, &suspects).is_empty(), "the rest shows it too");
 }
 
 #[test]
@@ -210,16 +210,16 @@ fn suspects_that_err_alike_beside_each_other_are_a_cause() {
         let sign = if k % 2 == 0 { 9.0 } else { -9.0 };
         apart_rows.rows_mut(at(*i).start, 3).copy_from(&Vector3::new(0.0, 0.0, sign));
     }
-    assert!((agreement(&p, &alike, &found) - 1.0).abs() < 1e-12);
-    assert!(agreement(&p, &apart_rows, &found) < MAX_AGREEMENT);
-    assert_eq!(agreement(&p, &alike, &found[..3]), 0.0, "three are too few to agree");
+    assert!((mean_neighbour_cosine(&p, &alike, &found) - 1.0).abs() < 1e-12);
+    assert!(mean_neighbour_cosine(&p, &apart_rows, &found) < MAX_AGREEMENT);
+    assert_eq!(mean_neighbour_cosine(&p, &alike, &found[..3]), 0.0, "three are too few to agree");
     // Two poses, each visited twice, err in opposite ways: next to each other they agree.
     let visits = [3, 62, 20, 45];
     let mut by_pose = DVector::zeros(p.rows());
     for (i, z) in visits.into_iter().zip([9.0, 9.0, -9.0, -9.0]) {
         by_pose.rows_mut(at(i).start, 3).copy_from(&Vector3::new(0.0, 0.0, z));
     }
-    assert!((agreement(&p, &by_pose, &visits) - 1.0).abs() < 1e-12);
+    assert!((mean_neighbour_cosine(&p, &by_pose, &visits) - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -238,7 +238,7 @@ fn a_direction_is_suspect_where_the_other_one_fits_far_better() {
     residual[15..18].fill(-2.0);
     signature[15..18].fill(0.5);
     assert_eq!(
-        flipped(&p, &residual, &signature),
+        flipped_arrivals(&p, &residual, &signature),
         [4],
         "24 and 12 are not enough, and dwell 2 has no direction"
     );

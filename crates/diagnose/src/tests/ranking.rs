@@ -122,13 +122,13 @@ fn several_effects_have_a_row_for_each_that_could_stand_in_the_place_of_one() {
 #[test]
 fn shares_of_several_effects_multiply() {
     use crate::search::search;
-    use crate::settle::{Scored, settle};
+    use crate::settle::{Scored, resolve_names};
     use crate::tests::{conditioned as first_room, entry, with_conditioned};
     let (p, config) = (planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3), quick());
     let base = first_room(&p, &config);
     with_conditioned(&p, &config, |conditioned_problems| {
         let mut found = search(conditioned_problems, &[], &config).unwrap();
-        settle(&mut found, conditioned_problems, &config).unwrap();
+        resolve_names(&mut found, conditioned_problems, &config).unwrap();
         assert_eq!(found.accepted.len(), 2);
         let shares = [("backlash:3", 0.75, 0.2, 0.05), ("zero_drift:3", 0.5, 0.4, 0.1)];
         for (a, (other, own, share, nothing)) in found.accepted.iter_mut().zip(shares) {

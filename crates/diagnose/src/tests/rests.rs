@@ -29,5 +29,5 @@ fn the_least_probable_ratio_is_that_of_the_f_distribution() {
 
 #[test]
 fn what_is_not_along_a_joint_lies_in_two_directions_across_it() {
-    assert_eq!(with([1.0, 2.0, 3.0], 4.0, 10.0), [5.0, 5.0, 4.0]);
+    assert_eq!(add_dwell_errors([1.0, 2.0, 3.0], 4.0, 10.0), [5.0, 5.0, 4.0]);
 }

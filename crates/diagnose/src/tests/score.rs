@@ -60,14 +60,14 @@ fn what_an_explanation_costs_is_taken_from_its_score() {
 fn weights_are_shares_and_what_is_alike_shares_alike() {
     let config = quick();
     let (a, b) = (score(&[3.0, -2.0, 7.0, 1.0]), score(&[1.0, 4.0, 2.0, 0.0]));
-    let all = weights(&[(&a, 3.0), (&b, 3.0), (&a, 3.0), (&b, 6.0)], &config);
+    let all = bootstrap_weights(&[(&a, 3.0), (&b, 3.0), (&a, 3.0), (&b, 6.0)], &config);
     assert!((all.iter().sum::<f64>() - 1.0).abs() < 1e-12 && all.iter().all(|w| (0.0..=1.0).contains(w)));
     assert!((all[0] - all[2]).abs() < 1e-12, "{all:?}");
     assert!((all[1] / all[3] - 3f64.exp()).abs() < 1e-9, "one amplitude more: {all:?}");
-    assert_eq!(weights(&[(&a, 27.0)], &config), [1.0]);
-    assert!(weights(&[], &config).is_empty());
+    assert_eq!(bootstrap_weights(&[(&a, 27.0)], &config), [1.0]);
+    assert!(bootstrap_weights(&[], &config).is_empty());
     // Far behind it is nothing, and no number that is not one.
-    let far = weights(&[(&a, 3.0), (&score(&[-1e5; 4]), 3.0)], &config);
+    let far = bootstrap_weights(&[(&a, 3.0), (&score(&[-1e5; 4]), 3.0)], &config);
     assert!((far[0] - 1.0).abs() < 1e-12 && far[1] < 1e-12, "{far:?}");
 }
 
@@ -75,8 +75,8 @@ fn weights_are_shares_and_what_is_alike_shares_alike() {
 fn weights_do_not_depend_on_the_order_of_explanations() {
     let config = quick();
     let all = [score(&[3.0, -2.0, 7.0]), score(&[1.0, 4.0, 2.0]), score(&[0.0, 5.0, 3.5])];
-    let forth = weights(&[(&all[0], 3.0), (&all[1], 6.0), (&all[2], 3.0)], &config);
-    let back = weights(&[(&all[2], 3.0), (&all[1], 6.0), (&all[0], 3.0)], &config);
+    let forth = bootstrap_weights(&[(&all[0], 3.0), (&all[1], 6.0), (&all[2], 3.0)], &config);
+    let back = bootstrap_weights(&[(&all[2], 3.0), (&all[1], 6.0), (&all[0], 3.0)], &config);
     assert!(forth.iter().zip(back.iter().rev()).all(|(a, b)| (a - b).abs() < 1e-12), "{forth:?} {back:?}");
 }
 
@@ -96,7 +96,7 @@ fn weights_are_those_of_a_bayesian_bootstrap() {
     let mean = shares.iter().sum::<f64>() / f64::from(draws);
     let variance = shares.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / f64::from(draws);
     let config = DiagnosisConfig { resamplings: 20_000, ..quick() };
-    let found = weights(&[(&score(&a), 6.0), (&score(&b), 3.0)], &config)[0];
+    let found = bootstrap_weights(&[(&score(&a), 6.0), (&score(&b), 3.0)], &config)[0];
     let error = (variance / 20_000.0 + variance / f64::from(draws)).sqrt();
     assert!((found - mean).abs() < 4.0 * error, "{found} {mean} +- {error}");
     assert!((0.1..0.9).contains(&mean) && variance > 0.05, "{mean} {variance}");

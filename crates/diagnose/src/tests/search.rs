@@ -6,7 +6,7 @@ use super::*;
 use crate::LinearRefit;
 use crate::forward::tests::{beside, planted, strong, told};
 use crate::problem::{Columns, Problem};
-use crate::settle::settle;
+use crate::settle::resolve_names;
 use crate::tests::{arm, own, quick, with_conditioned};
 use crate::weigh::weigh;
 use std::sync::Arc;
@@ -16,12 +16,12 @@ fn something_is_missing_where_an_explanation_predicts() {
     let config = quick();
     let cell = |spec| [(spec, true, 0.5)];
     let mut r = told(("backlash:2", 1.0), &cell("backlash:1"));
-    assert!(something(&r, &config), "however little the weighing likes it");
+    assert!(is_something_missing(&r, &config), "however little the weighing likes it");
     r.weighed.p_nothing = config.max_probability_nothing;
-    assert!(!something(&r, &config), "nothing may be missing");
+    assert!(!is_something_missing(&r, &config), "nothing may be missing");
     // Another joint's play predicts nothing, and a listed one is no shape without a name.
-    assert!(!something(&told(("backlash:1", 50.0), &cell("backlash:2")), &config));
-    assert!(!something(&told(("backlash:1", 50.0), &[]), &config));
+    assert!(!is_something_missing(&told(("backlash:1", 50.0), &cell("backlash:2")), &config));
+    assert!(!is_something_missing(&told(("backlash:1", 50.0), &[]), &config));
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn of_names_that_the_data_leave_the_known_one_is_told() {
     let told = |p: &Problem| {
         let s = with_conditioned(p, &config, |conditioned_problems| {
             let mut s = search(conditioned_problems, &[], &config)?;
-            settle(&mut s, conditioned_problems, &config)?;
+            resolve_names(&mut s, conditioned_problems, &config)?;
             Ok::<_, DiagnoseError>(s)
         });
         let [one] = &s.unwrap().accepted[..] else { panic!("one effect was planted") };
@@ -171,7 +171,7 @@ fn a_name_falls_to_a_curve_that_says_the_same_and_to_no_other() {
         with_conditioned(&p, &config, |conditioned_problems| {
             let steps = strong(&p, &["backlash:1", "zero_drift:2"]);
             let accepted = confirm(conditioned_problems, steps, &[], &config).unwrap();
-            let rest = conditioned_problems.with(&named(&accepted)).unwrap();
+            let rest = conditioned_problems.with(&accepted_candidates(&accepted)).unwrap();
             let kept = beside_curves(conditioned_problems, accepted, &[curve], &rest, &config).unwrap();
             kept.into_iter()
                 .map(|a| (a.candidate.spec, a.conditioned.problem.geometry.ncols()))

@@ -22,7 +22,7 @@ fn asked<T>(p: &Problem, ask: impl FnOnce(&Search, &mut ConditionedProblems<'_>)
     let config = quick();
     with_conditioned(p, &config, |conditioned_problems| {
         let mut found = search(conditioned_problems, &[], &config).unwrap();
-        settle(&mut found, conditioned_problems, &config).unwrap();
+        resolve_names(&mut found, conditioned_problems, &config).unwrap();
         ask(&found, conditioned_problems)
     })
 }
@@ -159,7 +159,7 @@ fn what_remains_is_what_the_settled_names_leave() {
         let offers =
             |found: &Search, name: &str| found.rest.weighed.entries.iter().any(|e| e.candidate.spec == name);
         assert!(offers(&found, "backlash:1"));
-        settle(&mut found, conditioned_problems, &config).unwrap();
+        resolve_names(&mut found, conditioned_problems, &config).unwrap();
         assert_eq!(found.accepted[0].candidate.spec, "backlash:1", "the simpler of the two");
         assert!(!offers(&found, "backlash:1"), "the room that was settled in has it in its base");
     });
@@ -232,7 +232,7 @@ fn settled_where(own: [f64; 4], unlisted: [f64; 4], cosine: f64) -> Option<Accep
     with_conditioned(&p, &config, |conditioned_problems| {
         let mut found = search(conditioned_problems, &[], &config).unwrap().accepted[0].clone();
         let conditioned = found.conditioned.clone();
-        for k in near(&found, &conditioned, &config) {
+        for k in near_entries(&found, &conditioned, &config) {
             let each = if k == found.judged.entry { own } else { [0.0; 4] };
             conditioned_problems.suppose(
                 std::slice::from_ref(&conditioned.weighed.entries[k].candidate),
@@ -244,7 +244,7 @@ fn settled_where(own: [f64; 4], unlisted: [f64; 4], cosine: f64) -> Option<Accep
         let (of_unlisted, of_name) = (score(&unlisted).unwrap(), score(&own).unwrap());
         let above = of_unlisted.above(&of_name);
         found.judged.unlisted = Some(crate::judge::Unlisted { score: of_unlisted, above, cosine });
-        settled(&found, &[], conditioned_problems, &config)
+        resolve_name(&found, &[], conditioned_problems, &config)
     })
 }
 
@@ -288,7 +288,7 @@ fn what_is_not_listed_is_told_beside_a_name_from_a_tenth_of_the_probability_on()
     assert!(doubted.iter().all(|n| *n > 0), "{doubted:?}");
 }
 
-/// The specs that [`answer`] tells where refits of these say so many nats a group more than nothing, in groups that hardly differ;
+/// The specs that [`answer_set`] tells where refits of these say so many nats a group more than nothing, in groups that hardly differ;
 /// and those that the user's knowledge leaves out. The name that was found is `backlash:1`.
 fn answered(p: &Problem, said: &[(&str, f64)], acts: &[&str]) -> (Vec<String>, Vec<String>) {
     let config = quick();
@@ -306,7 +306,7 @@ fn answered(p: &Problem, said: &[(&str, f64)], acts: &[&str]) -> (Vec<String>, V
         let found = Accepted { judged: conditioned.judge(own, &config), ..found };
         let refits: Vec<(usize, Score)> =
             said.iter().map(|(spec, nats)| (at(&conditioned, spec), each(*nats))).collect();
-        let (set, left_out) = answer(&found, &refits, &each(0.0), &conditioned, &config);
+        let (set, left_out) = answer_set(&found, &refits, &each(0.0), &conditioned, &config);
         (set.into_iter().map(|k| conditioned.weighed.entries[k].candidate.spec.clone()).collect(), left_out)
     })
 }
@@ -351,7 +351,7 @@ fn of_one_answer_what_is_known_to_act_is_told_and_the_others_are_named() {
     assert_eq!(answered(&p, &said, &[]).1, owned(&[]));
 }
 
-/// The specs of [`near`] a play whose score is so many nats above nothing, where one step gives others so many nats more than the play.
+/// The specs of [`near_entries`] a play whose score is so many nats above nothing, where one step gives others so many nats more than the play.
 fn near_a_play(p: &Problem, gain: f64, more: &[(&str, f64)]) -> Vec<String> {
     let config = quick();
     let score = |nats: f64| {
@@ -368,7 +368,7 @@ fn near_a_play(p: &Problem, gain: f64, more: &[(&str, f64)]) -> Vec<String> {
         found.judged = conditioned.judge(own, &config);
         found.judged.score = score(gain);
         found.judged.gain = found.judged.score.above(&score(0.0));
-        near(&found, &conditioned, &config)
+        near_entries(&found, &conditioned, &config)
             .into_iter()
             .map(|k| conditioned.weighed.entries[k].candidate.spec.clone())
             .collect()

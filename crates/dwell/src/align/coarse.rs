@@ -42,7 +42,7 @@ pub(crate) fn search(
     let own = Lags::within(sensor, max_offset_s);
     let all = own.further(drift_of(drifts) * half_s);
     let longest_s = if drifts == 0 { f64::INFINITY } else { all.step_s / max_drift };
-    let runs: Vec<(f64, Vec<Sums>)> = runs(&points, longest_s)
+    let runs: Vec<(f64, Vec<Sums>)> = split_runs(&points, longest_s)
         .map(|run| (0.5 * (run[0].0 + run[run.len() - 1].0), lags::sums(run, robot, |t_s| t_s, all)))
         .collect();
     let curve = |d: i64| -> Vec<f64> {
@@ -77,7 +77,7 @@ pub(crate) fn search(
 }
 
 /// Points in runs no longer than so many seconds.
-fn runs(points: &[(f64, f64)], longest_s: f64) -> impl Iterator<Item = &[(f64, f64)]> {
+fn split_runs(points: &[(f64, f64)], longest_s: f64) -> impl Iterator<Item = &[(f64, f64)]> {
     let mut began_s = points.first().map_or(0.0, |p| p.0);
     points.chunk_by(move |_, next| {
         let same = next.0 - began_s <= longest_s;

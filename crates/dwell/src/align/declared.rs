@@ -2,8 +2,8 @@
 
 use armcal_core::{JointSamples, PoseSamples, Severity, Warning};
 
-use super::warnings::say;
-use super::{NominalArm, SIGMA_FLOOR_S, estimate};
+use super::warnings::clock_warning;
+use super::{NominalArm, SIGMA_FLOOR_S, estimate_alignment};
 use crate::config::Declared;
 use crate::series::seconds_between;
 use crate::{ClockAlignment, ClockConfig, DwellError};
@@ -41,9 +41,9 @@ pub(super) fn align(
     };
     let unchecked = |why: &DwellError| {
         let message = format!("offset and drift are taken as declared; the motion cannot check them: {why}");
-        say(Severity::Notice, "clock-unchecked", message)
+        clock_warning(Severity::Notice, "clock-unchecked", message)
     };
-    match estimate(joints, tip, arm, &search) {
+    match estimate_alignment(joints, tip, arm, &search) {
         Ok((found, said)) => {
             alignment.correlation = found.correlation;
             alignment.displacement_ratio = found.displacement_ratio;
@@ -51,7 +51,7 @@ pub(super) fn align(
             let about_the_data =
                 |w: &Warning| ["clock-displacement-ratio", "clock-not-linear"].contains(&&*w.code);
             let mut warnings: Vec<Warning> = said.into_iter().filter(about_the_data).collect();
-            warnings.extend(contradiction(&alignment, &found, first_ns, last_ns));
+            warnings.extend(contradiction_warning(&alignment, &found, first_ns, last_ns));
             Ok((alignment, warnings))
         }
         Err(
@@ -68,14 +68,14 @@ pub(super) fn align(
                  clock.offset_ms and which stamps the streams use",
                 declared.offset_s * 1e3
             );
-            Ok((alignment, vec![say(Severity::Inadequate, "clock-contradicted", message)]))
+            Ok((alignment, vec![clock_warning(Severity::Inadequate, "clock-contradicted", message)]))
         }
         Err(why) => Err(why),
     }
 }
 
 /// Whether what was found differs from what was declared, at the middle, the beginning or the end.
-fn contradiction(
+fn contradiction_warning(
     declared: &ClockAlignment,
     found: &ClockAlignment,
     first_ns: i64,
@@ -102,5 +102,5 @@ fn contradiction(
         offset_ms(declared),
         by_s * 1e3,
     );
-    Some(say(Severity::Inadequate, "clock-contradicted", message))
+    Some(clock_warning(Severity::Inadequate, "clock-contradicted", message))
 }

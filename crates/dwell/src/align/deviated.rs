@@ -60,7 +60,7 @@ impl Streams<'_> {
     /// The part of the robot's track that speeds at these times on its clock [s] come from.
     pub(super) fn near(&self, scale: &Scale, at_s: impl Iterator<Item = f64>) -> Near {
         let all = self.robot.thinned(0.0);
-        let reached = reached(&self.robot.time_s, &all, PATH_WIDTHS * scale.h_s, at_s);
+        let reached = runs_in_reach(&self.robot.time_s, &all, PATH_WIDTHS * scale.h_s, at_s);
         let (track, rows) = self.robot.of_runs(&reached);
         Near { track, joint_rows: rows.into_iter().map(|row| self.joint_rows[row]).collect() }
     }
@@ -78,7 +78,7 @@ impl Streams<'_> {
         parameters: &[f64],
         step_s: f64,
     ) -> SpeedProfile {
-        let path_m = predicted(self.joints, joint_rows, &*self.arm.with(parameters));
+        let path_m = predicted_path_m(self.joints, joint_rows, &*self.arm.with(parameters));
         scale.like_robot(track.speeds_of(&path_m, scale.h_s, step_s))
     }
 
@@ -94,7 +94,7 @@ impl Streams<'_> {
             return None;
         }
         let thinned = self.robot.thinned(scale.h_s / TRIED_ROWS);
-        let rows = reached(&self.robot.time_s, &thinned, scale.h_s, at_s).concat();
+        let rows = runs_in_reach(&self.robot.time_s, &thinned, scale.h_s, at_s).concat();
         let joint_rows: Vec<usize> = rows.iter().map(|row| self.joint_rows[*row]).collect();
         let (moved, of_row) = where_moved(self.joints, &joint_rows);
         let arm = self.arm.with(so_far);
@@ -161,7 +161,11 @@ impl Deviations {
 }
 
 /// The path that a model predicts of some rows of the joints' readings [m].
-pub(super) fn predicted(joints: &JointSamples, rows: &[usize], arm: &dyn PlacedArm) -> Vec<Vector3<f64>> {
+pub(super) fn predicted_path_m(
+    joints: &JointSamples,
+    rows: &[usize],
+    arm: &dyn PlacedArm,
+) -> Vec<Vector3<f64>> {
     let tip_m = |joint_rad: &mut Vec<f64>, row: &usize| {
         joint_rad.clear();
         joint_rad.extend(joints.joint_rad.iter().map(|column| column[*row]));
@@ -171,7 +175,7 @@ pub(super) fn predicted(joints: &JointSamples, rows: &[usize], arm: &dyn PlacedA
 }
 
 /// Of some rows those that a kernel of half-width `h_s` at any of the times reaches, in runs without others between them.
-fn reached<'r>(
+fn runs_in_reach<'r>(
     time_s: &[f64],
     rows: &'r [usize],
     h_s: f64,

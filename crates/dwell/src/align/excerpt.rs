@@ -8,7 +8,7 @@ use armcal_core::robust::percentile;
 use armcal_core::{JointSamples, PoseSamples};
 use std::ops::Range;
 
-use super::shifted;
+use super::shift_ns;
 use crate::ClockConfig;
 use crate::series::seconds_between;
 
@@ -46,8 +46,11 @@ impl Excerpt {
         let h_s = (0.5 * config.smoothing_s).max(2.0 * period_s).max(2.0 * joint_period_s);
         let piece = ((PIECE_WIDTHS * h_s / period_s).ceil() as usize).max(1);
         let whole = tip.len() <= PIECES.saturating_mul(piece);
-        let pieces =
-            if whole { std::iter::once(0..tip.len()).collect() } else { pieces(tip, piece, h_s / period_s) };
+        let pieces = if whole {
+            std::iter::once(0..tip.len()).collect()
+        } else {
+            moving_pieces(tip, piece, h_s / period_s)
+        };
         let time_s = |row: usize| seconds_between(tip.time_ns[0], tip.time_ns[row]);
         let span_s = time_s(tip.len() - 1);
         let within = |rows: &Range<usize>| {
@@ -55,7 +58,7 @@ impl Excerpt {
             let from_middle_s = (from_s - 0.5 * span_s).abs().max((to_s - 0.5 * span_s).abs());
             let drifted_s = 1e-6 * config.max_drift_ppm * from_middle_s;
             let beside_s = config.max_offset_s + drifted_s + BESIDE_WIDTHS * h_s;
-            let robot_ns = |tip_ns: i64, by_s: f64| shifted(tip_ns, by_s - config.initial_offset_s);
+            let robot_ns = |tip_ns: i64, by_s: f64| shift_ns(tip_ns, by_s - config.initial_offset_s);
             (robot_ns(tip.time_ns[rows.start], -beside_s), robot_ns(tip.time_ns[rows.end - 1], beside_s))
         };
         let mut wanted: Vec<(i64, i64)> = pieces.iter().map(within).collect();
@@ -68,7 +71,7 @@ impl Excerpt {
         let mut kept = Vec::new();
         for (from_ns, to_ns) in wanted {
             let from = joints.time_ns.partition_point(|t| *t < from_ns);
-            thin(&joints.time_ns, from, to_ns, h_s / JOINT_ROWS, &mut kept);
+            add_spaced_rows(&joints.time_ns, from, to_ns, h_s / JOINT_ROWS, &mut kept);
         }
         Excerpt { tip: pieces, joints: kept }
     }
@@ -83,7 +86,7 @@ fn period_s(time_ns: &[i64]) -> f64 {
 
 /// Of each of as many equal parts of the rows the piece in which the tip moves longest; the first of those, and up to where
 /// the tip rests.
-fn pieces(tip: &PoseSamples, piece: usize, asked: f64) -> Vec<Range<usize>> {
+fn moving_pieces(tip: &PoseSamples, piece: usize, asked: f64) -> Vec<Range<usize>> {
     let every = (asked.round() as usize).clamp(1, piece);
     let rows: Vec<usize> = (0..tip.len()).step_by(every).collect();
     let speed_m_s = |w: &[usize]| {
@@ -114,7 +117,7 @@ fn pieces(tip: &PoseSamples, piece: usize, asked: f64) -> Vec<Range<usize>> {
 
 /// Adds the rows from one on up to a time that are at least so far apart, and behind those that are there already. A row before
 /// a step that long is kept: a break is then no longer than it was.
-fn thin(time_ns: &[i64], from: usize, to_ns: i64, apart_s: f64, kept: &mut Vec<usize>) {
+fn add_spaced_rows(time_ns: &[i64], from: usize, to_ns: i64, apart_s: f64, kept: &mut Vec<usize>) {
     let from = kept.last().map_or(from, |last| from.max(last + 1));
     for row in from..time_ns.len() {
         if time_ns[row] > to_ns {

@@ -200,7 +200,7 @@ struct Sums {
 }
 
 /// Groups points into movements: cut at rest once `shortest_s` long, and anywhere at three times that.
-pub(crate) fn movements(points: &[(f64, f64)], moving_above: f64, shortest_s: f64) -> Vec<Point> {
+pub(crate) fn group_movements(points: &[(f64, f64)], moving_above: f64, shortest_s: f64) -> Vec<Point> {
     let (mut began_s, mut movement) = (f64::NEG_INFINITY, 0);
     let mut grouped: Vec<Point> = Vec::with_capacity(points.len());
     for &(t_s, measured) in points {

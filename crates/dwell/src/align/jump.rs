@@ -6,7 +6,7 @@ use super::scale::Scale;
 use super::spread::MovementOffset;
 use super::stamps::Stamps;
 use super::steady::{self, LEAST_MOVEMENTS};
-use super::{Estimate, Streams, shifted};
+use super::{Estimate, Streams, shift_ns};
 
 /// A change smaller than this is not worth a word [s].
 const LEAST_S: f64 = 5e-3;
@@ -43,7 +43,7 @@ impl Streams<'_> {
         let mut movements = estimate.fine.movements.clone();
         let (mut total_s, mut stretch) = (0.0, None);
         if let Some((from_s, to_s, late_s)) = self.far_stretch(scale, &points, start) {
-            shift(&mut points, from_s, to_s, late_s);
+            shift_points(&mut points, from_s, to_s, late_s);
             total_s = late_s;
             movements = self.again(scale, &points, &mut start, &mut model, fixed)?;
             stretch = Some((from_s, to_s));
@@ -52,22 +52,22 @@ impl Streams<'_> {
             let found = match stretch {
                 None => steady::other_offset(&movements, with_drift, least_s)?,
                 Some((from_s, to_s)) => {
-                    let (first, end) = inside(&movements, from_s, to_s);
-                    steady::measured(&movements, with_drift, first, end)?
+                    let (first, end) = movements_between(&movements, from_s, to_s);
+                    steady::stretch_offset(&movements, with_drift, first, end)?
                 }
             };
             let (from_s, to_s) = (movements[found.first].from_s, movements[found.end - 1].to_s);
             stretch = Some((from_s, to_s));
             total_s += found.by_s;
-            shift(&mut points, from_s, to_s, found.by_s);
+            shift_points(&mut points, from_s, to_s, found.by_s);
             if found.by_s.abs() < 0.2 * found.sigma_s {
                 break;
             }
             movements = self.again(scale, &points, &mut start, &mut model, fixed)?;
         }
         let (from_s, to_s) = stretch?;
-        let (first, end) = inside(&movements, from_s, to_s);
-        let sigma_s = steady::measured(&movements, with_drift, first, end)?.sigma_s;
+        let (first, end) = movements_between(&movements, from_s, to_s);
+        let sigma_s = steady::stretch_offset(&movements, with_drift, first, end)?.sigma_s;
         if total_s.abs() < least_s.max(ALIGNMENT_SIGMAS * sigma_s) {
             return None;
         }
@@ -173,9 +173,9 @@ impl Streams<'_> {
     fn seen_there(&self, jump: &Jump) -> String {
         let margin_s = self.config.max_offset_s;
         let end_s = jump.until_s.map_or(2.0 * self.reference_s, |until| until.1);
-        let at_ns = |s: f64| shifted(self.tip.time_ns[0], s);
+        let at_ns = |s: f64| shift_ns(self.tip.time_ns[0], s);
         let (from_ns, to_ns) = (at_ns(jump.after_s - margin_s), at_ns(end_s + margin_s));
-        let robot_ns = |ns: i64| shifted(ns, -self.config.initial_offset_s);
+        let robot_ns = |ns: i64| shift_ns(ns, -self.config.initial_offset_s);
         let streams = [
             ("joint", "joints", &self.joints.time_ns, robot_ns(from_ns), robot_ns(to_ns)),
             ("tip", "tip", &self.tip.time_ns, from_ns, to_ns),
@@ -196,14 +196,14 @@ impl Streams<'_> {
     }
 }
 
-fn shift(points: &mut [Point], from_s: f64, to_s: f64, late_s: f64) {
+fn shift_points(points: &mut [Point], from_s: f64, to_s: f64, late_s: f64) {
     for point in points.iter_mut().filter(|p| (from_s..=to_s).contains(&p.t_s)) {
         point.late_s += late_s;
     }
 }
 
 /// The movements within two sensor times.
-fn inside(movements: &[MovementOffset], from_s: f64, to_s: f64) -> (usize, usize) {
+fn movements_between(movements: &[MovementOffset], from_s: f64, to_s: f64) -> (usize, usize) {
     let first = movements.partition_point(|m| m.from_s < from_s);
     (first, movements.partition_point(|m| m.from_s <= to_s).max(first))
 }

@@ -97,7 +97,11 @@ pub(crate) fn sums(
         let predicted: Vec<Option<f64>> = (0..run.len() + count - 1).map(at).collect();
         let known: Vec<f64> = predicted.iter().map(|y| f64::from(y.is_some())).collect();
         let predicted: Vec<f64> = predicted.into_iter().map(Option::unwrap_or_default).collect();
-        let [n, y, yy] = [until(&known, |one| one), until(&predicted, |y| y), until(&predicted, |y| y * y)];
+        let [n, y, yy] = [
+            running_sums(&known, |one| one),
+            running_sums(&predicted, |y| y),
+            running_sums(&predicted, |y| y * y),
+        ];
         let measured = DVector::from_iterator(run.len(), run.iter().map(|point| point.1));
         let squares = measured.map(|x| x * x);
         for (from, sums) in (0..count).rev().zip(&mut sums) {
@@ -118,7 +122,7 @@ pub(crate) fn sums(
 }
 
 /// Running sums: of the numbers before each, and of all.
-fn until(numbers: &[f64], of: fn(f64) -> f64) -> Vec<f64> {
+fn running_sums(numbers: &[f64], of: fn(f64) -> f64) -> Vec<f64> {
     let mut sum = 0.0;
     let sums = numbers.iter().map(|number| {
         sum += of(*number);

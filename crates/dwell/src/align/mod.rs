@@ -22,7 +22,7 @@ use std::borrow::Cow;
 use crate::series::{check_joints, check_poses, seconds_between};
 use crate::{ClockAlignment, ClockConfig, DwellError};
 use coarse::Coarse;
-use deviated::predicted;
+use deviated::predicted_path_m;
 use excerpt::Excerpt;
 use fine::{Point, Problem, Start};
 use scale::{Scale, Track};
@@ -97,11 +97,11 @@ pub fn align_clocks(
     }
     match config.declared() {
         Some(declared) => declared::align(joints, tip, arm, config, declared),
-        None => estimate(joints, tip, arm, config),
+        None => estimate_alignment(joints, tip, arm, config),
     }
 }
 
-fn estimate(
+fn estimate_alignment(
     joints: &JointSamples,
     tip: &PoseSamples,
     arm: &dyn NominalArm,
@@ -174,14 +174,14 @@ impl<'a> Streams<'a> {
         config: &'a ClockConfig,
     ) -> Result<Streams<'a>, DwellError> {
         let origin_ns = tip.time_ns[0];
-        let robot_origin_ns = shifted(origin_ns, -config.initial_offset_s);
+        let robot_origin_ns = shift_ns(origin_ns, -config.initial_offset_s);
         let excerpt = Excerpt::of(joints, tip, config);
         let seen = || excerpt.tip.iter().cloned().flatten();
         let (time_ns, path_m): (Vec<i64>, Vec<_>) =
             seen().map(|i| (tip.time_ns[i], tip.position_m[i])).unzip();
         let sensor = Track::of(&time_ns, origin_ns, path_m, config);
         let joint_rows = excerpt.joints;
-        let path_m = predicted(joints, &joint_rows, &*arm.with(&vec![0.0; arm.uncertain()]));
+        let path_m = predicted_path_m(joints, &joint_rows, &*arm.with(&vec![0.0; arm.uncertain()]));
         let time_ns: Vec<i64> = joint_rows.iter().map(|row| joints.time_ns[*row]).collect();
         let robot = Track::of(&time_ns, robot_origin_ns, path_m, config);
         // Two samples in each half of the kernel, or a slow stream would be smoothed differently.
@@ -237,7 +237,7 @@ impl<'a> Streams<'a> {
     fn no_overlap(&self) -> DwellError {
         let (j, t) = (&self.joints.time_ns, &self.tip.time_ns);
         let (j, t) = ((j[0], j[j.len() - 1]), (t[0], t[t.len() - 1]));
-        let on_robot = |ns: i64| shifted(ns, -self.config.initial_offset_s);
+        let on_robot = |ns: i64| shift_ns(ns, -self.config.initial_offset_s);
         let overlap_s = seconds_between(j.0.max(on_robot(t.0)), j.1.min(on_robot(t.1))).max(0.0);
         if overlap_s > 0.5 * seconds_between(t.0, t.1) {
             return DwellError::RarelyTogether { rows: self.rows_in_words() };
@@ -279,7 +279,7 @@ impl<'a> Streams<'a> {
         let movements = scale.movements()?;
         let fixed = (self.max_drift() == 0.0).then_some(0.0);
         let problem = Problem::new(&scale.robot, &movements, self.reference_s, fixed);
-        let state = problem.solve(start).ok_or_else(undetermined)?;
+        let state = problem.solve(start).ok_or_else(undetermined_error)?;
         let start = Start { offset_s: state.x, drift: state.y / problem.half_s };
         let points = scale.sensor.points(2);
         let correlation =
@@ -293,7 +293,7 @@ impl<'a> Streams<'a> {
         let most = self.max_drift();
         let solve = |fixed: Option<f64>| {
             self.finish_with(scale, &movements, found.start, vec![0.0; self.arm.uncertain()], fixed)
-                .ok_or_else(undetermined)
+                .ok_or_else(undetermined_error)
         };
         if most == 0.0 {
             return Ok(Estimate { fine: solve(Some(0.0))?, drift: Drift::Estimated });
@@ -418,7 +418,7 @@ impl<'a> Streams<'a> {
             offset_sigma_s: variance.max(0.0).sqrt().max(SIGMA_FLOOR_S),
             drift: fine.drift,
             drift_sigma: drift_sigma.max(SIGMA_FLOOR_S / last_s.max(1.0)),
-            reference_ns: shifted(self.tip.time_ns[0], reference_s),
+            reference_ns: shift_ns(self.tip.time_ns[0], reference_s),
             correlation: if correlation.is_finite() { correlation.clamp(0.0, 1.0) } else { 0.0 },
             displacement_ratio,
             declared: false,
@@ -426,7 +426,7 @@ impl<'a> Streams<'a> {
     }
 }
 
-fn undetermined() -> DwellError {
+fn undetermined_error() -> DwellError {
     DwellError::NoMotion {
         seen: "the movements do not determine an offset".to_owned(),
         advice: "record more moves between poses",
@@ -434,7 +434,7 @@ fn undetermined() -> DwellError {
 }
 
 /// `t_ns` plus some seconds, without overflow.
-fn shifted(t_ns: i64, by_s: f64) -> i64 {
+fn shift_ns(t_ns: i64, by_s: f64) -> i64 {
     t_ns.saturating_add((by_s * 1e9).round() as i64)
 }
 

@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 use std::ops::Range;
 
-use super::fine::{Point, movements};
+use super::fine::{Point, group_movements};
 use super::profile::SpeedProfile;
 use super::spread::MIN_MOVEMENTS;
-use crate::series::{breaking_gap_s, seconds_between, typical_period_s, unbroken};
+use crate::series::{breaking_gap_s, seconds_between, typical_period_s, unbroken_runs};
 use crate::{ClockConfig, DwellError};
 
 /// Movements shorter than this are counted together when errors are estimated [s].
@@ -43,7 +43,7 @@ impl Track {
         let gap_s = breaking_gap_s(config.max_gap_s, period_s);
         Track {
             time_s: time_ns.iter().map(|&t| seconds_between(origin_ns, t)).collect(),
-            unbroken: unbroken(time_ns, gap_s, |i| position_m[i].iter().all(|v| v.is_finite())),
+            unbroken: unbroken_runs(time_ns, gap_s, |i| position_m[i].iter().all(|v| v.is_finite())),
             position_m,
             period_s,
         }
@@ -187,7 +187,7 @@ impl Scale {
         let points = self.sensor.points(2);
         let mut shortest_s = self.shortest_s;
         loop {
-            let grouped = movements(&points, self.moving_above, shortest_s);
+            let grouped = group_movements(&points, self.moving_above, shortest_s);
             let groups = grouped.last().map_or(0, |p| p.movement + 1);
             if groups >= MIN_MOVEMENTS {
                 return Ok(grouped);

@@ -95,7 +95,8 @@ impl Step {
         if by_movement.len() < MIN_MOVEMENTS {
             return None;
         }
-        let parts: Vec<Part> = by_movement.iter().map(|rows| part(state, rows, deviations)).collect();
+        let parts: Vec<Part> =
+            by_movement.iter().map(|rows| normal_equations(state, rows, deviations)).collect();
         let size = parts[0].gradient.len();
         let (mut whole, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for part in &parts {
@@ -259,7 +260,7 @@ impl Step {
     }
 }
 
-fn part(state: &Vector4<f64>, rows: &[Row], deviations: Option<&Deviations>) -> Part {
+fn normal_equations(state: &Vector4<f64>, rows: &[Row], deviations: Option<&Deviations>) -> Part {
     let uncertain = deviations.map_or(0, |d| d.so_far.len());
     let (mut jacobian, mut weighted) = (DMatrix::zeros(rows.len(), 4 + uncertain), Vec::new());
     let (mut rates, mut shares, mut squares) = (vec![0.0; uncertain], Vec::new(), 0.0);

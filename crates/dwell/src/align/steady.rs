@@ -56,7 +56,7 @@ pub(crate) fn other_offset(all: &[MovementOffset], with_drift: bool, least_s: f6
 }
 
 /// How much another offset a given stretch has.
-pub(crate) fn measured(
+pub(crate) fn stretch_offset(
     all: &[MovementOffset],
     with_drift: bool,
     first: usize,

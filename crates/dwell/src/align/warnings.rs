@@ -10,7 +10,7 @@ use crate::ClockAlignment;
 /// A drift beyond the limit by fewer standard errors is one on the limit.
 const BEYOND_SIGMAS: f64 = 3.0;
 
-pub(super) fn say(severity: Severity, code: &'static str, message: String) -> Warning {
+pub(super) fn clock_warning(severity: Severity, code: &'static str, message: String) -> Warning {
     Warning::new(severity, Stage::Dwell, code, "clock", message)
 }
 
@@ -31,7 +31,7 @@ impl Streams<'_> {
             );
             let far = !(0.5..=2.0).contains(&found.displacement_ratio);
             let severity = if far { Severity::Inadequate } else { Severity::Notice };
-            warnings.push(say(severity, "clock-displacement-ratio", message));
+            warnings.push(clock_warning(severity, "clock-displacement-ratio", message));
         }
         if let Some(rival_s) = coarse.rival_s {
             let message = format!(
@@ -40,7 +40,7 @@ impl Streams<'_> {
                 self.config.initial_offset_s + rival_s,
                 found.offset_s
             );
-            warnings.push(say(Severity::Inadequate, "clock-ambiguous", message));
+            warnings.push(clock_warning(Severity::Inadequate, "clock-ambiguous", message));
         }
         warnings.extend(self.drift_warning(estimate.drift));
         if found.offset_sigma_s > 0.02 {
@@ -48,10 +48,10 @@ impl Streams<'_> {
                 "the offset is known to {:.0} ms only; record more and faster moves",
                 found.offset_sigma_s * 1e3
             );
-            warnings.push(say(Severity::Notice, "clock-uncertain", message));
+            warnings.push(clock_warning(Severity::Notice, "clock-uncertain", message));
         }
         if let Some(jump) = jump {
-            warnings.push(say(Severity::Inadequate, "clock-not-linear", self.jump_in_words(jump)));
+            warnings.push(clock_warning(Severity::Inadequate, "clock-not-linear", self.jump_in_words(jump)));
         }
         warnings
     }
@@ -65,7 +65,7 @@ impl Streams<'_> {
                     "the recording is too short to tell the drift better than clock.max_drift_ppm = {most_ppm}; taken as \
                      zero with that standard error"
                 );
-                Some(say(Severity::Notice, "clock-drift-unknown", message))
+                Some(clock_warning(Severity::Notice, "clock-drift-unknown", message))
             }
             Drift::Limited { wanted, sigma } => {
                 let message = format!(
@@ -76,7 +76,7 @@ impl Streams<'_> {
                 );
                 let beyond = wanted.abs() - self.max_drift() > BEYOND_SIGMAS * sigma;
                 let severity = if beyond { Severity::Inadequate } else { Severity::Notice };
-                Some(say(severity, "clock-drift-limited", message))
+                Some(clock_warning(severity, "clock-drift-limited", message))
             }
         }
     }

@@ -6,8 +6,8 @@
 mod recordings;
 mod sessions;
 
-pub use recordings::{Transfer, transfers};
-pub use sessions::{Asked, SessionTransfer, between};
+pub use recordings::{Transfer, transfer_between_recordings};
+pub use sessions::{Asked, SessionTransfer, transfer_between_sessions};
 
 use armcal_model::EffectSpec;
 use serde::Serialize;

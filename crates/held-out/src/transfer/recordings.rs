@@ -40,7 +40,7 @@ impl Transfer {
 ///
 /// # Errors
 /// A fit without one of the recordings that cannot be made.
-pub fn transfers(
+pub fn transfer_between_recordings(
     pipeline: &Pipeline,
     geometry: &Model,
     (base, new): (&[EffectSpec], &[EffectSpec]),

@@ -6,7 +6,7 @@
 
 use super::LeftOut;
 use crate::error::HeldOutError;
-use crate::stored::{lasts, place_arms};
+use crate::stored::{is_lasting, place_arms};
 use armcal_calibrate::{HeldOut, HoldoutConfig, calibrate, compare_errors, mean_by_dwell};
 use armcal_config::Pipeline;
 use armcal_core::{DwellId, Warning};
@@ -77,20 +77,23 @@ impl SessionTransfer {
 ///
 /// # Errors
 /// Pipelines that cannot be run, setups that contradict their data, sessions that share readings, arms of two kinds.
-pub fn between(asked: &Asked<'_>, progress: &dyn Steps) -> Result<SessionTransfer, HeldOutError> {
+pub fn transfer_between_sessions(
+    asked: &Asked<'_>,
+    progress: &dyn Steps,
+) -> Result<SessionTransfer, HeldOutError> {
     let (from, mut to) = (Pipeline::load(asked.from)?, Pipeline::load(asked.to)?);
     // All of it judges: none of it is fitted but frames.
     to.holdout = HoldoutConfig::None;
     let (_, chain) = frames::nominal_chain(&from)?;
     let named = asked.effects.iter().map(|word| EffectSpec::parse(word, chain.joint_names()));
     let named: Vec<EffectSpec> = named.collect::<Result<_, _>>().map_err(HeldOutError::Usage)?;
-    let taught = sound(&from, progress)?;
-    let judge = sound(&to, progress)?;
+    let taught = converge_session(&from, progress)?;
+    let judge = converge_session(&to, progress)?;
     let seen = taught.inputs.seen.iter().chain(&judge.inputs.seen);
     let fingerprints: Vec<_> = seen.map(|s| (s.name.as_str(), s.fingerprint.as_ref())).collect();
     preprocess::refuse_repeated(&fingerprints)?;
 
-    let (effects, left_behind) = effects(named, &from, &taught, progress)?;
+    let (effects, left_behind) = effects_to_judge(named, &from, &taught, progress)?;
     progress.step(&format!("judging {} in {}", from.name, to.name));
     let carrier =
         Carrier { path: asked.from, from: &from, taught: &taught.fitted, to: &to, judge: &judge.fitted };
@@ -124,14 +127,14 @@ pub fn between(asked: &Asked<'_>, progress: &dyn Steps) -> Result<SessionTransfe
 }
 
 /// A session without a mistake in its setup: of another, every sentence would be about the mistake.
-fn sound(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Converged, HeldOutError> {
+fn converge_session(pipeline: &Pipeline, progress: &dyn Steps) -> Result<Converged, HeldOutError> {
     let settled = armcal_pipeline::settle(pipeline, progress)?;
     settled.refuse_mistakes()?;
     Ok(settled)
 }
 
 /// What is judged, and what cannot be.
-fn effects(
+fn effects_to_judge(
     named: Vec<EffectSpec>,
     from: &Pipeline,
     taught: &Converged,
@@ -150,7 +153,7 @@ fn effects(
         left_behind.extend(of_time.iter().map(LeftOut::of_time));
     }
     // What is said of the lasting ones is said where they are carried over.
-    let (lasting, events): (Vec<_>, Vec<_>) = all.into_iter().partition(|e| lasts(e, &mut Vec::new()));
+    let (lasting, events): (Vec<_>, Vec<_>) = all.into_iter().partition(|e| is_lasting(e, &mut Vec::new()));
     left_behind.extend(events.iter().map(LeftOut::event));
     Ok((lasting, left_behind))
 }

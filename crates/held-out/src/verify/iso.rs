@@ -92,7 +92,7 @@ impl Shown<'_> {
             commanded: TipPose::at(commands[at].commanded_m),
             attained: TipPose::at(attained_m),
             time_ns: dwell.mid_ns(),
-            approach: approach(&way),
+            approach: approach_direction(&way),
             departed_ns: before.map(|d| d.end_ns),
             arrival: way
                 .iter()
@@ -125,7 +125,8 @@ impl Shown<'_> {
         joint_rad: Vec<f64>,
     ) -> Vector3<f64> {
         let (seen, nowhere) = (&self.seen[recording], Reference::position(Vector3::zeros()));
-        let o = Observation { joint_rad, ..observe::observation(dwell, seen, nowhere, Matrix3::zeros()) };
+        let o =
+            Observation { joint_rad, ..observe::dwell_observation(dwell, seen, nowhere, Matrix3::zeros()) };
         self.base.predicted_tip_m(side.values, &o)
     }
 
@@ -169,7 +170,7 @@ struct Command {
 }
 
 /// Direction of the last way before the stop, where it is long enough.
-fn approach(way: &[(i64, Vector3<f64>)]) -> Option<Vector3<f64>> {
+fn approach_direction(way: &[(i64, Vector3<f64>)]) -> Option<Vector3<f64>> {
     let stop_m = way.last()?.1;
     let from = way.iter().rev().find(|(_, m)| (stop_m - m).norm() > APPROACH_M)?;
     Some(stop_m - from.1)

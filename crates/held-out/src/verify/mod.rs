@@ -9,7 +9,7 @@ mod point;
 mod told;
 
 use crate::error::HeldOutError;
-use crate::stored::place;
+use crate::stored::place_model;
 use armcal_config::{BoardPose, Pipeline};
 use armcal_core::{Observation, Severity, Warning};
 use armcal_model::Chain;
@@ -37,12 +37,13 @@ pub fn verify(
 ) -> Result<Verification, HeldOutError> {
     let past = open_model(result)?;
     let (_, chain) = frames::nominal_chain(pipeline)?;
-    let board = frames::board(pipeline)?;
+    let board = frames::read_board(pipeline)?;
     let recordings = preprocess::open_all(pipeline, progress)?;
     let mut samples = Vec::new();
     let seen = preprocess::dwells_of_all(pipeline, &chain, &recordings, progress, &mut |s| samples.push(s))?;
     progress.step("comparing");
-    let Distinct { pipeline, seen, samples, warnings: once } = once::distinct(pipeline, seen, samples);
+    let Distinct { pipeline, seen, samples, warnings: once } =
+        once::distinct_recordings(pipeline, seen, samples);
     let pipeline = &pipeline;
     let surroundings =
         Surroundings { result, past: &past, pipeline, chain: &chain, board: board.as_ref(), seen: &seen };
@@ -62,8 +63,8 @@ pub fn verify(
         motions: &motions,
     };
     let iso9283 = shown.assess()?;
-    let recordings = seen.iter().zip(&motions).map(|(s, m)| recording(s, m)).collect();
-    let told = told::told(&past, &seen);
+    let recordings = seen.iter().zip(&motions).map(|(s, m)| verified_recording(s, m)).collect();
+    let told = told::recordings_in_calibration(&past, &seen);
     warnings.extend(told.iter().map(told::not_held_out));
     warnings.extend(once);
     warnings.extend(told::beyond_calibrated(placed.model.chain(), &past.visited, &observations, &samples));
@@ -78,9 +79,9 @@ pub fn verify(
         told,
         recognises_copies: past.recordings.iter().all(|r| r.dwells.is_some()),
         closing: Closing::of(&observations),
-        points: armcal_verify::points(&points, &names, &joints),
+        points: armcal_verify::compare_points(&points, &names, &joints),
         samples: motions.iter().flat_map(|m| &m.errors).map(|e| PathSample::of(e, &names)).collect(),
-        paths: rows(motions, &names),
+        paths: path_rows(motions, &names),
         iso9283,
         parameters: past.parameters,
         published: pipeline.verify.published.clone(),
@@ -88,7 +89,7 @@ pub fn verify(
     })
 }
 
-fn recording(seen: &RecordingData, motion: &Motion) -> VerifiedRecording {
+fn verified_recording(seen: &RecordingData, motion: &Motion) -> VerifiedRecording {
     VerifiedRecording {
         name: seen.name.clone(),
         dwells: seen.dwells.len(),
@@ -100,14 +101,14 @@ fn recording(seen: &RecordingData, motion: &Motion) -> VerifiedRecording {
 }
 
 /// Rows of the path table.
-fn rows(motions: Vec<Motion>, names: &[String]) -> Vec<PathRow> {
+fn path_rows(motions: Vec<Motion>, names: &[String]) -> Vec<PathRow> {
     let clocks: Vec<Option<ClockError>> = motions.iter().map(|m| m.clock_error).collect();
     let (mut errors, mut planned) = (Vec::new(), BTreeMap::new());
     for motion in motions {
         errors.extend(motion.errors);
         planned.extend(motion.planned);
     }
-    armcal_verify::paths(&errors, names, &clocks, &planned)
+    armcal_verify::compare_paths(&errors, names, &clocks, &planned)
 }
 
 /// Warnings of a recording, with its name.
@@ -141,7 +142,7 @@ impl Surroundings<'_> {
     /// The calibrated model in its place, and the dwells in theirs.
     fn settle(&self) -> Result<(Placed, Vec<Observation>, Vec<Warning>), HeldOutError> {
         let mut model = frames::nominal_model(self.pipeline, self.chain, self.board, self.seen)?;
-        let mut placed = place(self.past, self.result, self.pipeline, &model)?;
+        let mut placed = place_model(self.past, self.result, self.pipeline, &model)?;
         let measures = Measures::of(self.pipeline, self.seen);
         if !measures.is_empty() {
             if self.pipeline.table.is_some() {
@@ -149,14 +150,14 @@ impl Surroundings<'_> {
                 return Err(RunError::Measure { name: "all".to_owned(), problem: problem.to_owned() }.into());
             }
             let none = self.seen.iter().map(|_| None).collect::<Vec<_>>();
-            let sure = observe::observations(self.pipeline, None, self.seen, &none).observations;
+            let sure = observe::build_observations(self.pipeline, None, self.seen, &none).observations;
             let (observations, said) = measures.judged(&mut placed, &sure)?;
             return Ok((placed, observations, said));
         }
         let mut places = self.associate(&placed, false)?;
         if self.pipeline.table.as_ref().is_some_and(|t| t.pose == BoardPose::Estimated) {
             frames::start_frames(self.pipeline, &mut model, &places);
-            placed = place(self.past, self.result, self.pipeline, &model)?;
+            placed = place_model(self.past, self.result, self.pipeline, &model)?;
         }
         let mut observations = self.observations(&places)?;
         let fitted = placed.fit_frames(self.pipeline, &observations)?;
@@ -179,6 +180,8 @@ impl Surroundings<'_> {
     }
 
     fn observations(&self, places: &[Option<Association>]) -> Result<Vec<Observation>, HeldOutError> {
-        Ok(observe::observations(self.pipeline, self.board, self.seen, places).not_empty()?.observations)
+        Ok(observe::build_observations(self.pipeline, self.board, self.seen, places)
+            .not_empty()?
+            .observations)
     }
 }

@@ -7,7 +7,7 @@ use armcal_dwell::{ClockAlignment, TrackSample, track};
 use armcal_stages::observe;
 use armcal_stages::{Placed, PlacedBase};
 use armcal_stages::{RecordingData, RunError};
-use armcal_verify::{ClockError, Lateness, Passing, PathError, Planned, Polyline, lateness, stretch};
+use armcal_verify::{ClockError, Lateness, Passing, PathError, Planned, Polyline, lateness, stretch_name};
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -59,7 +59,7 @@ impl<'a> Judge<'a> {
             // A declared clock stays as declared.
             let Some(thought) = clock.as_ref().filter(|c| !c.declared) else { break };
             let Some(found) = self.lateness(&one, thought, &moments) else { break };
-            let corrected = corrected(thought, &found);
+            let corrected = correct_clock(thought, &found);
             moments = one.moments(Some(&corrected))?;
             clock = Some(corrected);
             if found.late_s.abs() < CLOCK_SETTLED_S {
@@ -95,7 +95,7 @@ impl<'a> Judge<'a> {
                 let velocity_mps = model.joint_jacobian(p, &o) * joints;
                 let error_m = model.residual(p, &o).position_m;
                 (
-                    stretch(one.motion(m), m.time_ns),
+                    stretch_name(one.motion(m), m.time_ns),
                     m.time_ns.saturating_sub(clock.reference_ns) as f64 * 1e-9,
                     Vector3::from_column_slice(velocity_mps.as_slice()),
                     error_m,
@@ -163,7 +163,7 @@ impl Recorded<'_> {
     }
 
     fn observation(&self, pipeline: &Pipeline, index: usize, m: &TrackSample) -> Observation {
-        observe::moving(pipeline, self.recording, index, self.seen, m)
+        observe::moving_observation(pipeline, self.recording, index, self.seen, m)
     }
 
     fn motion(&self, m: &TrackSample) -> DwellId {
@@ -179,7 +179,7 @@ pub(super) fn set_point(stream: &JointSamples, time_ns: i64) -> Option<Vec<f64>>
 }
 
 /// A clock whose stamps turned out to be late.
-fn corrected(thought: &ClockAlignment, found: &Lateness) -> ClockAlignment {
+fn correct_clock(thought: &ClockAlignment, found: &Lateness) -> ClockAlignment {
     let reference_ns = thought.reference_ns.saturating_add((found.since_s * 1e9) as i64);
     ClockAlignment {
         offset_s: thought.offset_s + thought.drift * found.since_s + found.late_s,

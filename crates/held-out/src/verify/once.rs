@@ -4,7 +4,7 @@ use armcal_config::Pipeline;
 use armcal_core::{JointSamples, Samples, Severity, Stage, Warning};
 use armcal_recording::{Fingerprint, SharedTime};
 use armcal_stages::RecordingData;
-use armcal_stages::preprocess::repeats;
+use armcal_stages::preprocess::find_repeats;
 
 /// New recordings, each with its samples; no time is in two of them.
 pub struct Distinct {
@@ -19,10 +19,14 @@ pub struct Distinct {
 }
 
 /// Leaves out of every recording what an earlier one holds: dwells and readings of the common time, or all of it.
-pub fn distinct(pipeline: &Pipeline, mut seen: Vec<RecordingData>, mut samples: Vec<Samples>) -> Distinct {
+pub fn distinct_recordings(
+    pipeline: &Pipeline,
+    mut seen: Vec<RecordingData>,
+    mut samples: Vec<Samples>,
+) -> Distinct {
     let fingerprints: Vec<&Fingerprint> = seen.iter().map(|s| s.fingerprint.as_ref()).collect();
     let mut warnings = Vec::new();
-    for repeat in repeats(&fingerprints) {
+    for repeat in find_repeats(&fingerprints) {
         let (of, all) = (seen[repeat.first].name.clone(), seen[repeat.second].dwells.len());
         let own = &mut seen[repeat.second];
         let joints = &mut samples[repeat.second].joints;
@@ -44,9 +48,9 @@ pub fn distinct(pipeline: &Pipeline, mut seen: Vec<RecordingData>, mut samples: 
     let mut pipeline = pipeline.clone();
     // Two rows are the least between which anything moves.
     let left: Vec<bool> = samples.iter().map(|s| s.joints.len() > 1).collect();
-    keep(&mut pipeline.recordings, &left);
-    keep(&mut seen, &left);
-    keep(&mut samples, &left);
+    retain_by_mask(&mut pipeline.recordings, &left);
+    retain_by_mask(&mut seen, &left);
+    retain_by_mask(&mut samples, &left);
     for (recording, seen) in seen.iter_mut().enumerate() {
         seen.dwells.iter_mut().for_each(|d| d.id.recording = recording);
     }
@@ -57,7 +61,7 @@ fn covers(shared: &SharedTime, time_ns: i64) -> bool {
     (shared.start_ns..=shared.end_ns).contains(&time_ns)
 }
 
-fn keep<T>(all: &mut Vec<T>, left: &[bool]) {
+fn retain_by_mask<T>(all: &mut Vec<T>, left: &[bool]) {
     let mut left = left.iter();
     all.retain(|_| left.next().is_some_and(|left| *left));
 }
@@ -65,7 +69,7 @@ fn keep<T>(all: &mut Vec<T>, left: &[bool]) {
 /// Takes the readings of a time out of a stream.
 fn leave_out(joints: &mut JointSamples, shared: &SharedTime) {
     let left: Vec<bool> = joints.time_ns.iter().map(|t| !covers(shared, *t)).collect();
-    keep(&mut joints.time_ns, &left);
+    retain_by_mask(&mut joints.time_ns, &left);
     let efforts = joints.effort_nm.iter_mut().flatten();
-    joints.joint_rad.iter_mut().chain(efforts).for_each(|column| keep(column, &left));
+    joints.joint_rad.iter_mut().chain(efforts).for_each(|column| retain_by_mask(column, &left));
 }

@@ -9,7 +9,7 @@ use armcal_stages::RecordingData;
 use std::collections::BTreeMap;
 
 /// The recordings that the calibration saw: the same files, or, re-encoded or cut, the same dwells.
-pub fn told(past: &StoredModel, seen: &[RecordingData]) -> Vec<Told> {
+pub fn recordings_in_calibration(past: &StoredModel, seen: &[RecordingData]) -> Vec<Told> {
     let of = |s: &RecordingData| {
         let marks: Vec<DwellMark> =
             s.dwells.iter().map(|d| DwellMark::of(d.mid_ns(), &d.joint_rad)).collect();
@@ -71,9 +71,9 @@ pub fn beyond_calibrated(
             "{far_dwells} of {} dwells and {percent} % of all readings are further than {} from every dwell of the \
              calibration (bins {}; calibrated: {}): the error there is extrapolated, not covered by it",
             dwells.len(),
-            shown(visited.bin, unit),
-            intervals(&beyond, unit),
-            intervals(visited, unit),
+            value_text(visited.bin, unit),
+            intervals_text(&beyond, unit),
+            intervals_text(visited, unit),
         );
         Some(Warning::new(
             Severity::Notice,
@@ -103,11 +103,11 @@ pub fn effort_unknown(model: &Model, observations: &[Observation]) -> Vec<Warnin
     model.effects().iter().filter_map(of).collect()
 }
 
-fn intervals(visited: &Visited, unit: Unit) -> String {
-    let one = |[low, high]: &[f64; 2]| format!("{:.0} to {}", unit.to_display(*low), shown(*high, unit));
+fn intervals_text(visited: &Visited, unit: Unit) -> String {
+    let one = |[low, high]: &[f64; 2]| format!("{:.0} to {}", unit.to_display(*low), value_text(*high, unit));
     visited.intervals.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-fn shown(si: f64, unit: Unit) -> String {
+fn value_text(si: f64, unit: Unit) -> String {
     format!("{:.0} {}", unit.to_display(si), unit.display_symbol())
 }

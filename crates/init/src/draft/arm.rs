@@ -2,10 +2,10 @@
 
 use super::Draft;
 use crate::error::InitError;
-use crate::page::{number, quoted, relative};
+use crate::page::{toml_float, toml_path, toml_string};
 use crate::proposal::Known;
 use crate::roles::Role;
-use crate::seats::lean;
+use crate::seats::median_tilt_rad;
 use armcal_core::robust::median;
 use armcal_model::{Model, Motion, Moving};
 use nalgebra::Vector3;
@@ -19,7 +19,7 @@ impl Draft<'_> {
         let Known { arm, sockets, .. } = self.known;
         self.page.section("[model]");
         if !arm.is_urdf() {
-            let line = format!("dh = {}", relative(&arm.file, &self.folder));
+            let line = format!("dh = {}", toml_path(&arm.file, &self.folder));
             self.page.line(&line, &format!("given: {} moving joints", arm.names.len()));
             return Ok(());
         }
@@ -29,9 +29,9 @@ impl Draft<'_> {
             (false, Some(_)) => "given",
         };
         let path = if arm.recorded { self.beside(".urdf", arm.text.clone()) } else { arm.file.clone() };
-        self.page.line(&format!("urdf = {}", relative(&path, &self.folder)), why);
+        self.page.line(&format!("urdf = {}", toml_path(&path, &self.folder)), why);
         let base = arm.base_link.as_deref().unwrap_or_default();
-        self.page.line(&format!("base_link = {}", quoted(base)), "before the first recorded joint");
+        self.page.line(&format!("base_link = {}", toml_string(base)), "before the first recorded joint");
         let found = sockets.as_ref().and_then(|s| s.tip_link.as_ref());
         let tip = found.or(arm.tips.first()).cloned().unwrap_or_default();
         let fixed = arm.tips.len();
@@ -50,7 +50,7 @@ impl Draft<'_> {
             ),
             _ => "behind the last recorded joint".to_owned(),
         };
-        self.page.line(&format!("tip_link = {}", quoted(&tip)), &why);
+        self.page.line(&format!("tip_link = {}", toml_string(&tip)), &why);
         self.page.section("[model.deviation]");
         self.page.line(
             "prior_sigma_mm = 0.3",
@@ -61,10 +61,12 @@ impl Draft<'_> {
             "and of a degree; without this section both are learnt from the recordings",
         );
         self.unseen.push("how exactly the arm was built: [model.deviation] assumes a factory; remove it, and the [[parameters]] below it, to have that learnt".to_owned());
-        for pattern in zeros(&arm.model_to(&tip)?)? {
+        for pattern in zero_patterns(&arm.model_to(&tip)?)? {
             self.page.section("[[parameters]]");
-            self.page
-                .line(&format!("name = {}", quoted(&pattern)), "zeros of the joints, which are set by hand:");
+            self.page.line(
+                &format!("name = {}", toml_string(&pattern)),
+                "zeros of the joints, which are set by hand:",
+            );
             self.page.line("prior = 1.0", "within a degree");
         }
         Ok(())
@@ -115,7 +117,7 @@ impl Draft<'_> {
                 },
             );
             if let Some(at_m) = tip.and_then(|t| self.tip_at_m(t, last)) {
-                let at: Vec<String> = at_m.iter().map(|x| number(*x, 3)).collect();
+                let at: Vec<String> = at_m.iter().map(|x| toml_float(*x, 3)).collect();
                 self.page.line(
                     &format!("at = {{ xyz_m = [{}] }}", at.join(", ")),
                     "where the nominal arm would have it: a start",
@@ -128,8 +130,8 @@ impl Draft<'_> {
                     .to_owned(),
             );
         }
-        if sensor && !bases.is_empty() && lean(&bases) > LEANS_RAD {
-            let lean_deg = lean(&bases).to_degrees();
+        if sensor && !bases.is_empty() && median_tilt_rad(&bases) > LEANS_RAD {
+            let lean_deg = median_tilt_rad(&bases).to_degrees();
             self.page.section("[frames]");
             self.page.line(
                 "vertical = \"base\"",
@@ -155,7 +157,7 @@ impl Draft<'_> {
 }
 
 /// Patterns of the parameters that are the zeros of the joints: rotations of their origins about their own axes.
-fn zeros(model: &Model) -> Result<Vec<String>, InitError> {
+fn zero_patterns(model: &Model) -> Result<Vec<String>, InitError> {
     let skeleton = model.skeleton(0, &model.nominal(), "base");
     let along = |moving: &Moving| {
         ["rx", "ry", "rz"]

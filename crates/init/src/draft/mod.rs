@@ -6,7 +6,7 @@ mod table;
 
 use super::page::Page;
 use super::proposal::Known;
-use armcal_recording::sealed;
+use armcal_recording::seal_text;
 use std::path::PathBuf;
 
 /// A proposal on its way to its text.
@@ -30,7 +30,7 @@ impl Draft<'_> {
     fn beside(&mut self, ending: &str, text: String) -> PathBuf {
         let stem = self.known.asked.out.file_stem().unwrap_or_default().to_string_lossy();
         let path = self.folder.join(format!("{stem}{ending}"));
-        self.beside.push((path.clone(), sealed(&text).into_owned()));
+        self.beside.push((path.clone(), seal_text(&text).into_owned()));
         path
     }
 }

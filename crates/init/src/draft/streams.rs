@@ -3,11 +3,11 @@
 use super::Draft;
 use crate::channels::BodyTopic;
 use crate::evidence::Evidence;
-use crate::page::{list, number, quoted, relative};
+use crate::page::{toml_float, toml_list, toml_path, toml_string};
 use crate::points::Points;
-use crate::read::key;
+use crate::read::body_key;
 use crate::roles::Role;
-use crate::seats::tilts;
+use crate::seats::table_tilts;
 use armcal_config::recording_name;
 use armcal_recording::{JointUnit, LengthUnit, StreamReport};
 use armcal_table::Tilt;
@@ -23,17 +23,17 @@ impl Draft<'_> {
         let known = self.known;
         let table = known.of_role(Role::Table).zip(known.board);
         let tilts: Vec<Option<Tilt>> =
-            table.map_or(Vec::new(), |(table, (_, board))| tilts(board, &known.evidence[table]));
+            table.map_or(Vec::new(), |(table, (_, board))| table_tilts(board, &known.evidence[table]));
         for (at, (opened, read)) in known.opened.iter().zip(&known.read.recordings).enumerate() {
             self.page.section("[[recordings]]");
-            let paths: Vec<String> = opened.entry.paths.iter().map(|p| relative(p, &self.folder)).collect();
+            let paths: Vec<String> = opened.entry.paths.iter().map(|p| toml_path(p, &self.folder)).collect();
             let times = &read.samples.joints.time_ns;
             let length_s = times.last().zip(times.first()).map_or(0.0, |(b, a)| (b - a) as f64 * 1e-9);
             let parts = if paths.len() > 1 { format!("{} parts, ", paths.len()) } else { String::new() };
             let why = format!("{parts}{length_s:.0} s, the joints pause {} times", read.dwells.len());
             self.page.line(&format!("paths = [{}]", paths.join(", ")), &why);
             if recording_name(None, &opened.entry.paths) != read.name {
-                self.page.line(&format!("name = {}", quoted(&read.name)), "");
+                self.page.line(&format!("name = {}", toml_string(&read.name)), "");
             }
             if let Some(points) = known.points.get(at) {
                 self.points(points);
@@ -44,7 +44,7 @@ impl Draft<'_> {
                 let angles = [("roll_deg", tilt.roll_rad), ("pitch_deg", tilt.pitch_rad)];
                 let angles = angles.iter().filter(|(_, rad)| rad.abs() > TILT_RAD);
                 let angles: Vec<String> =
-                    angles.map(|(key, rad)| format!("{key} = {}", number(rad.to_degrees(), 1))).collect();
+                    angles.map(|(key, rad)| format!("{key} = {}", toml_float(rad.to_degrees(), 1))).collect();
                 if !angles.is_empty() {
                     let why = "how the table was turned against the recording in which it is most level";
                     self.page.line(&format!("tilt = {{ {} }}", angles.join(", ")), why);
@@ -64,8 +64,9 @@ impl Draft<'_> {
             Some(LengthUnit::M) => "m",
             _ => "mm",
         };
-        let time = points.time.as_ref().map_or(String::new(), |time| format!(", time = {}", quoted(time)));
-        let csv = relative(&points.path, &self.folder);
+        let time =
+            points.time.as_ref().map_or(String::new(), |time| format!(", time = {}", toml_string(time)));
+        let csv = toml_path(&points.path, &self.folder);
         let how = if points.time.is_some() { "by their times" } else { "dwells in their order" };
         self.page.line(
             &format!("points = {{ csv = {csv}, unit = \"{unit}\", sigma_mm = 0.05{time} }}"),
@@ -88,17 +89,17 @@ impl Draft<'_> {
         let joints = &known.read.streams.joints[0];
         self.page.section("[streams.joints]");
         let report = known.read.recordings.first().and_then(|r| r.report("joints"));
-        self.page.line(&format!("topic = {}", quoted(&joints.topic)), &rate(report));
+        self.page.line(&format!("topic = {}", toml_string(&joints.topic)), &rate_note(report));
         let source = &known.arm.source;
         let why = match source.names.is_empty() {
             true => "as the model has them: the messages name none",
             false => "as recorded, in the order of the model",
         };
-        self.page.line(&format!("names = {}", list(&joints.names)), why);
+        self.page.line(&format!("names = {}", toml_list(&joints.names)), why);
         if let Some(field) = &source.field {
-            self.page.line(&format!("position = {}", quoted(&field.position)), &field.why);
+            self.page.line(&format!("position = {}", toml_string(&field.position)), &field.why);
             if let Some(name) = &field.name {
-                self.page.line(&format!("name = {}", quoted(name)), "the names beside them");
+                self.page.line(&format!("name = {}", toml_string(name)), "the names beside them");
             }
         }
         if joints.unit == JointUnit::Deg {
@@ -128,14 +129,14 @@ impl Draft<'_> {
             self.body(body, &format!("bodies.{name}"));
             self.page.section(&format!("[markers.{name}]"));
             self.page.line(
-                &format!("link = {}", quoted(carried)),
+                &format!("link = {}", toml_string(carried)),
                 "the link that it follows; where on it is estimated",
             );
         }
         if let Some(temperature) = &known.read.streams.temperature {
             self.page.section("[streams.temperature]");
             let report = known.read.recordings.first().and_then(|r| r.report("temperature"));
-            self.page.line(&format!("topic = {}", quoted(&temperature.topic)), &rate(report));
+            self.page.line(&format!("topic = {}", toml_string(&temperature.topic)), &rate_note(report));
         } else {
             let called = known.warm.iter().map(|(topic, path)| format!("topic {topic} with value {path}"));
             let called: Vec<String> = called.collect();
@@ -165,27 +166,28 @@ impl Draft<'_> {
 
     fn body(&mut self, body: usize, section: &str) {
         let known = self.known;
-        let stream = &known.read.streams.bodies[&key(body)];
+        let stream = &known.read.streams.bodies[&body_key(body)];
         self.page.section(&format!("[streams.{section}]"));
-        let report = known.read.recordings.iter().find_map(|r| r.report(&format!("bodies.{}", key(body))));
-        self.page.line(&format!("topic = {}", quoted(&stream.topic)), &known.cast[body].why);
+        let report =
+            known.read.recordings.iter().find_map(|r| r.report(&format!("bodies.{}", body_key(body))));
+        self.page.line(&format!("topic = {}", toml_string(&stream.topic)), &known.cast[body].why);
         if let Some(name) = &stream.body {
-            self.page.line(&format!("body = {}", quoted(name)), "the topic has several");
+            self.page.line(&format!("body = {}", toml_string(name)), "the topic has several");
         }
         if let Some(frame) = &stream.frame {
             self.page.line(
-                &format!("frame = {}", quoted(frame)),
+                &format!("frame = {}", toml_string(frame)),
                 "over the transforms between, as the bodies hang on several frames",
             );
         }
         let fields = [("position", &stream.position), ("orientation", &stream.orientation)];
         for (key, path) in fields.into_iter().filter_map(|(key, path)| Some((key, path.as_ref()?))) {
-            self.page.line(&format!("{key} = {}", quoted(path)), "a field of the message");
+            self.page.line(&format!("{key} = {}", toml_string(path)), "a field of the message");
         }
         if stream.unit == LengthUnit::Mm {
             self.page.line("unit = \"mm\"", "too far away for metres");
         }
-        self.page.note(&rate(report));
+        self.page.note(&rate_note(report));
     }
 
     fn clock(&mut self) {
@@ -194,7 +196,7 @@ impl Draft<'_> {
         let Some(clearest) = moving.max_by(|a, b| a.correlation.total_cmp(&b.correlation)) else { return };
         if clearest.delay_s.abs() > LATE_S {
             self.page.section("[clock]");
-            let toml = format!("initial_offset_s = {}", number(clearest.delay_s, 1));
+            let toml = format!("initial_offset_s = {}", toml_float(clearest.delay_s, 1));
             self.page.line(
                 &toml,
                 &format!(
@@ -206,7 +208,7 @@ impl Draft<'_> {
     }
 }
 
-fn rate(report: Option<&StreamReport>) -> String {
+fn rate_note(report: Option<&StreamReport>) -> String {
     report.map_or(String::new(), |r| {
         let occluded = r.occluded.total();
         let hidden = if occluded > 0 {

@@ -1,7 +1,7 @@
 //! The table, and the hold-out that fits it.
 
 use super::Draft;
-use crate::page::{Page, list, number, quoted, relative};
+use crate::page::{Page, toml_float, toml_list, toml_path, toml_string};
 use crate::roles::Role;
 use crate::sockets::Sockets;
 
@@ -21,12 +21,12 @@ impl Draft<'_> {
                 visits.join(", "),
                 sockets.scatter_m * 1e3
             );
-            self.page.line(&format!("board = {}", relative(&path, &self.folder)), &why);
+            self.page.line(&format!("board = {}", toml_path(&path, &self.folder)), &why);
             self.page.line("pose = \"estimated\"", "one pose a recording, unknown");
             self.page.section("[table.association]");
             let names: Vec<&str> = sockets.board.cavities.iter().map(|c| c.name.as_str()).collect();
             self.page.line(
-                &format!("visiting_order = {}", list(&names)),
+                &format!("visiting_order = {}", toml_list(&names)),
                 "in the order of their first visit in every recording",
             );
             if names.len() > 1 {
@@ -49,7 +49,7 @@ impl Draft<'_> {
         };
         self.page.section("[table]");
         self.page.line(
-            &format!("board = {}", relative(path, &self.folder)),
+            &format!("board = {}", toml_path(path, &self.folder)),
             &format!("given: {} cavities", board.cavities.len()),
         );
         match &known.seats {
@@ -81,7 +81,7 @@ impl Draft<'_> {
                     self.page.section("[table.association]");
                     let names: Vec<&str> = board.cavities.iter().map(|c| c.name.as_str()).collect();
                     self.page.line(
-                        &format!("visiting_order = {}", list(&names)),
+                        &format!("visiting_order = {}", toml_list(&names)),
                         "assumed: as the board file has them",
                     );
                     self.unsure.push(format!(
@@ -138,7 +138,7 @@ fn sockets_toml(sockets: &Sockets) -> String {
     page.note("armcal.board/1, proposed by `armcal init`: places that the tip came back to, in the order of their first visit.");
     page.note("Distances are those at which the calibration errs least; put the drawing's in their place.");
     page.line("name = \"sockets\"", "");
-    let mm = |m: f64| number(m * 1e3, 3);
+    let mm = |m: f64| toml_float(m * 1e3, 3);
     page.line(
         &format!("cavity_sigma_mm = {}", mm(sockets.board.cavity_sigma_m)),
         "assumed: tolerance of a socket's position, per axis",
@@ -149,8 +149,8 @@ fn sockets_toml(sockets: &Sockets) -> String {
     );
     for (cavity, visits) in sockets.board.cavities.iter().zip(&sockets.visits) {
         page.section("[[cavities]]");
-        page.line(&format!("name = {}", quoted(&cavity.name)), "");
-        let at: Vec<String> = cavity.in_board_m.iter().map(|m| number(m * 1e3, 2)).collect();
+        page.line(&format!("name = {}", toml_string(&cavity.name)), "");
+        let at: Vec<String> = cavity.in_board_m.iter().map(|m| toml_float(m * 1e3, 2)).collect();
         page.line(&format!("xyz_mm = [{}]", at.join(", ")), &format!("{visits} pauses"));
     }
     page.text()

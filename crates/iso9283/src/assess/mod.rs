@@ -26,14 +26,14 @@ pub fn assess(evidence: &Evidence, settings: &Settings) -> Result<Assessment, Is
         paths::assess(path, settings, &mut findings)?;
     }
     findings.lack(&EXCHANGEABILITY, "one recorded robot", EXCHANGEABILITY.needs);
-    Ok(findings.finish(notes(cycles::by_pose(&cycles).len())))
+    Ok(findings.finish(general_notes(cycles::by_pose(&cycles).len())))
 }
 
 /// Poses that the standard asks for, P1 to P5.
 const POSES: usize = 5;
 
 /// What the evidence cannot prove about the test as a whole.
-fn notes(poses: usize) -> Vec<String> {
+fn general_notes(poses: usize) -> Vec<String> {
     let few = (1..POSES).contains(&poses).then(|| format!("{poses} commanded poses instead of {POSES}"));
     let unknown = "the standard asks for poses and paths in the largest cube within the most used part of the \
                    working space, at rated load and velocity: not checked here";

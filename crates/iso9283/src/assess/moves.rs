@@ -8,7 +8,7 @@ use crate::criterion::{Findings, Place};
 use crate::distance::{distance_accuracy, distance_repeatability};
 use crate::evidence::{Settings, Visit};
 use crate::pose::pose_repeatability;
-use crate::settling::{Settling, overshoot_m, posing_time_s, settle, stabilization_time_s};
+use crate::settling::{Settling, measure_settling, overshoot_m, posing_time_s, stabilization_time_s};
 use crate::tip_pose::TipPose;
 
 /// Moves from one pose to the next, repeated.
@@ -19,7 +19,7 @@ struct Moves<'a> {
 }
 
 pub(super) fn assess(visits: &[Visit], cycles: &[Cycles<'_>], settings: &Settings, findings: &mut Findings) {
-    let moves = moves(visits);
+    let moves = moves_between_poses(visits);
     for moved in &moves {
         assess_distance(moved, findings);
     }
@@ -33,7 +33,7 @@ pub(super) fn assess(visits: &[Visit], cycles: &[Cycles<'_>], settings: &Setting
 }
 
 /// Every move within a recording from one commanded pose to another, in order of first appearance.
-fn moves(visits: &[Visit]) -> Vec<Moves<'_>> {
+fn moves_between_poses(visits: &[Visit]) -> Vec<Moves<'_>> {
     let mut moves: Vec<Moves<'_>> = Vec::new();
     let mut sorted = in_time(visits);
     sorted.sort_by_key(|visit| visit.recording);
@@ -95,8 +95,10 @@ fn assess_settling(known: &Cycles<'_>, settings: &Settings, findings: &mut Findi
     if sampled.is_empty() {
         return lack(findings, &"needs samples of the tip around the stop");
     }
-    let settled: Result<Vec<Settling>, _> =
-        sampled.iter().map(|visit| settle(&visit.arrival, &visit.attained.position_m, band_m)).collect();
+    let settled: Result<Vec<Settling>, _> = sampled
+        .iter()
+        .map(|visit| measure_settling(&visit.arrival, &visit.attained.position_m, band_m))
+        .collect();
     let numbers = settled
         .and_then(|settled| Ok((stabilization_time_s(&settled)?, overshoot_m(&settled)?, settled.len())));
     match numbers {
@@ -121,7 +123,7 @@ fn assess_posing(moved: &Moves<'_>, bands_m: &[(&str, f64)], findings: &mut Find
     let arrivals = timed.filter(|(_, to)| !to.arrival.is_empty());
     let cycles: Result<Vec<[i64; 2]>, _> = arrivals
         .map(|(departed_ns, to)| {
-            Ok([departed_ns, settle(&to.arrival, &to.attained.position_m, *band_m)?.settled_ns])
+            Ok([departed_ns, measure_settling(&to.arrival, &to.attained.position_m, *band_m)?.settled_ns])
         })
         .collect();
     match cycles.and_then(|cycles| Ok((posing_time_s(&cycles)?, cycles.len()))) {

@@ -8,7 +8,7 @@ use crate::command::{CommandPath, Plane};
 use crate::criterion::{Findings, Place};
 use crate::evidence::{PathTest, Settings};
 use crate::path::{path_accuracy, path_repeatability};
-use crate::planes::{Crossing, cross};
+use crate::planes::{Crossing, find_crossings};
 use crate::settling::elapsed_s;
 use crate::tip_pose::TipPose;
 use crate::velocity::{velocity_accuracy, velocity_fluctuation_m_s, velocity_repeatability};
@@ -23,7 +23,8 @@ pub(super) fn assess(path: &PathTest, settings: &Settings, findings: &mut Findin
     let command = CommandPath::new(&path.commanded)?;
     let planes = command.planes(settings.planes);
     let reach_m = REACH * command.length_m();
-    let runs: Vec<Vec<Option<Crossing>>> = path.runs.iter().map(|run| cross(&planes, run, reach_m)).collect();
+    let runs: Vec<Vec<Option<Crossing>>> =
+        path.runs.iter().map(|run| find_crossings(&planes, run, reach_m)).collect();
     assess_planes(path, &command, settings, &planes, &runs, findings);
     assess_corners(path, &command, settings, findings);
     assess_speed(path, &planes, &runs, findings);

@@ -4,7 +4,7 @@ use super::{close, mm, sampled, turned};
 use crate::command::CommandPath;
 use crate::cornering::{overshoot_m, round_off_m};
 use crate::path::{path_accuracy, path_repeatability};
-use crate::planes::{Crossing, cross};
+use crate::planes::{Crossing, find_crossings};
 use crate::velocity::{velocity_accuracy, velocity_fluctuation_m_s, velocity_repeatability};
 use crate::{IsoError, TimedPose, TipPose};
 use nalgebra::Vector3;
@@ -17,7 +17,7 @@ fn on_planes(
 ) -> (Vec<TipPose>, Vec<Vec<TipPose>>) {
     let planes = command.planes(count);
     let crossings: Vec<Vec<Option<Crossing>>> =
-        runs.iter().map(|run| cross(&planes, run, 0.3 * command.length_m())).collect();
+        runs.iter().map(|run| find_crossings(&planes, run, 0.3 * command.length_m())).collect();
     let attained = |i: usize| crossings.iter().map(|run| run[i].unwrap().pose).collect();
     (planes.iter().map(|p| p.pose).collect(), (0..count).map(attained).collect())
 }
@@ -81,11 +81,11 @@ fn a_plane_that_a_run_does_not_reach_stays_empty() {
     let command = CommandPath::new(&[mm(0.0, 0.0, 0.0), mm(100.0, 0.0, 0.0)]).unwrap();
     let planes = command.planes(10);
     let half = sampled(0.01, 0.5, |t| mm(100.0 * t, 0.0, 0.0));
-    let crossed: Vec<bool> = cross(&planes, &half, 0.03).iter().map(Option::is_some).collect();
+    let crossed: Vec<bool> = find_crossings(&planes, &half, 0.03).iter().map(Option::is_some).collect();
     assert_eq!(crossed, [[true; 5], [false; 5]].concat());
     let far = sampled(0.01, 1.0, |t| mm(100.0 * t, 31.0, 0.0));
-    assert!(cross(&planes, &far, 0.03).iter().all(Option::is_none));
-    assert!(cross(&planes, &[], 0.03).iter().all(Option::is_none));
+    assert!(find_crossings(&planes, &far, 0.03).iter().all(Option::is_none));
+    assert!(find_crossings(&planes, &[], 0.03).iter().all(Option::is_none));
 }
 
 #[test]

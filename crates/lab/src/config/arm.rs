@@ -1,6 +1,6 @@
 //! The arm: its nominal geometry, how far the built one deviates, its drives.
 
-use super::{not_negative, positive, value};
+use super::{check_not_negative, check_positive, value_error};
 use crate::LabError;
 use serde::{Deserialize, Serialize};
 
@@ -131,32 +131,35 @@ impl Default for DeviationConfig {
 
 impl ArmConfig {
     pub(super) fn check(&self) -> Result<(), LabError> {
-        not_negative("arm.deviation.length_mm", self.deviation.length_mm)?;
-        not_negative("arm.deviation.angle_deg", self.deviation.angle_deg)?;
-        not_negative("arm.tip_kg", self.tip_kg)?;
-        not_negative("arm.deviation.mass_percent", self.deviation.mass_percent)?;
+        check_not_negative("arm.deviation.length_mm", self.deviation.length_mm)?;
+        check_not_negative("arm.deviation.angle_deg", self.deviation.angle_deg)?;
+        check_not_negative("arm.tip_kg", self.tip_kg)?;
+        check_not_negative("arm.deviation.mass_percent", self.deviation.mass_percent)?;
         if self.deviation.mass_percent >= 100.0 {
-            return Err(value("arm.deviation.mass_percent", "must stay below 100".into()));
+            return Err(value_error("arm.deviation.mass_percent", "must stay below 100".into()));
         }
         if !self.rows[0].joint {
-            return Err(value(
+            return Err(value_error(
                 "arm.rows",
                 "the first row must be a joint; put a fixed base into `base`".into(),
             ));
         }
         for row in &self.rows {
             if [row.theta_deg, row.d_m, row.a_m, row.alpha_deg].iter().any(|v| !v.is_finite()) {
-                return Err(value("arm.rows", format!("row `{}` has a number that is not finite", row.name)));
+                return Err(value_error(
+                    "arm.rows",
+                    format!("row `{}` has a number that is not finite", row.name),
+                ));
             }
         }
         for drive in &self.drives {
-            positive("arm.drives.inertia_kg_m2", drive.inertia_kg_m2)?;
-            not_negative("arm.drives.viscous_nms_rad", drive.viscous_nms_rad)?;
-            not_negative("arm.drives.link_kg", drive.link_kg)?;
-            positive("arm.drives.kp_nm_rad", drive.kp_nm_rad)?;
-            not_negative("arm.drives.ki_nm_rad_s", drive.ki_nm_rad_s)?;
-            not_negative("arm.drives.kd_nms_rad", drive.kd_nms_rad)?;
-            positive("arm.drives.max_torque_nm", drive.max_torque_nm)?;
+            check_positive("arm.drives.inertia_kg_m2", drive.inertia_kg_m2)?;
+            check_not_negative("arm.drives.viscous_nms_rad", drive.viscous_nms_rad)?;
+            check_not_negative("arm.drives.link_kg", drive.link_kg)?;
+            check_positive("arm.drives.kp_nm_rad", drive.kp_nm_rad)?;
+            check_not_negative("arm.drives.ki_nm_rad_s", drive.ki_nm_rad_s)?;
+            check_not_negative("arm.drives.kd_nms_rad", drive.kd_nms_rad)?;
+            check_positive("arm.drives.max_torque_nm", drive.max_torque_nm)?;
         }
         Ok(())
     }

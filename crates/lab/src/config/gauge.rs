@@ -1,6 +1,6 @@
 //! Instruments that read one length of the tip: a ballbar or a wire to a fixed point, a gauge above a plane.
 
-use super::{default_placement_mm, not_negative, positive, range, value};
+use super::{check_not_negative, check_positive, check_range, default_placement_mm, value_error};
 use crate::LabError;
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
@@ -62,13 +62,13 @@ fn default_rate_hz() -> f64 {
 impl GaugeConfig {
     pub(super) fn check(&self) -> Result<(), LabError> {
         if self.topic.is_empty() {
-            return Err(value("gauges.topic", "is empty; name it".to_owned()));
+            return Err(value_error("gauges.topic", "is empty; name it".to_owned()));
         }
-        not_negative("gauges.placement_sigma_mm", self.placement_sigma_mm)?;
-        not_negative("gauges.placement_sigma_deg", self.placement_sigma_deg)?;
-        not_negative("gauges.zero_sigma_mm", self.zero_sigma_mm)?;
-        not_negative("gauges.noise_mm", self.noise_mm)?;
-        positive("gauges.rate_hz", self.rate_hz)?;
-        range("gauges.range_mm", self.range_mm)
+        check_not_negative("gauges.placement_sigma_mm", self.placement_sigma_mm)?;
+        check_not_negative("gauges.placement_sigma_deg", self.placement_sigma_deg)?;
+        check_not_negative("gauges.zero_sigma_mm", self.zero_sigma_mm)?;
+        check_not_negative("gauges.noise_mm", self.noise_mm)?;
+        check_positive("gauges.rate_hz", self.rate_hz)?;
+        check_range("gauges.range_mm", self.range_mm)
     }
 }

@@ -114,7 +114,7 @@ pub struct RecordingConfig {
 impl LabConfig {
     /// Reads and checks a lab file.
     pub fn from_toml(text: &str, path: &Path) -> Result<LabConfig, LabError> {
-        let config: LabConfig = parse("lab file", text, path)?;
+        let config: LabConfig = parse_toml("lab file", text, path)?;
         config.check()?;
         Ok(config)
     }
@@ -136,7 +136,7 @@ impl LabConfig {
         ];
         for (key, size) in sizes {
             if size != joints || joints == 0 {
-                return Err(value(key, format!("has {size} entries for an arm of {joints} joints")));
+                return Err(value_error(key, format!("has {size} entries for an arm of {joints} joints")));
             }
         }
         self.arm.check()?;
@@ -145,7 +145,10 @@ impl LabConfig {
             if let StopConfig::Pose { joint_deg, from_deg } = stop
                 && ![joint_deg, from_deg].iter().all(|q| q.len() == joints && q.iter().all(|q| q.is_finite()))
             {
-                return Err(value("task.tours.stops", format!("a pose needs {joints} finite joint angles")));
+                return Err(value_error(
+                    "task.tours.stops",
+                    format!("a pose needs {joints} finite joint angles"),
+                ));
             }
         }
         self.hand.check()?;
@@ -160,16 +163,16 @@ impl LabConfig {
             ("interval_s", self.interval_s),
             ("board.true_cavity_sigma_mm", self.board.true_cavity_sigma_mm.unwrap_or(0.0)),
         ];
-        board.iter().try_for_each(|(key, v)| not_negative(key, *v))?;
+        board.iter().try_for_each(|(key, v)| check_not_negative(key, *v))?;
         if self.start_unix_s > 2_100_000_000 {
             let why = "lies beyond 2036, where ROS 2 stamps end soon; give seconds, not milliseconds";
-            return Err(value("start_unix_s", why.into()));
+            return Err(value_error("start_unix_s", why.into()));
         }
         self.check_recordings()?;
         let (recordings, markers) = (self.recordings.len(), self.vicon.markers.len());
         if let Some(marker) = self.vicon.markers.iter().find(|m| !(1..=joints).contains(&m.link)) {
             let why = format!("must be a joint from 1 to {joints}, is {}", marker.link);
-            return Err(value("vicon.markers.link", why));
+            return Err(value_error("vicon.markers.link", why));
         }
         let mut tables = self.mechanisms.iter().enumerate();
         tables.try_for_each(|(table, m)| m.hidden().check(&Keys { table, joints, recordings, markers }))
@@ -177,18 +180,18 @@ impl LabConfig {
 
     fn check_recordings(&self) -> Result<(), LabError> {
         if self.recordings.is_empty() {
-            return Err(value("recordings", "there are none; add a [[recordings]] table".into()));
+            return Err(value_error("recordings", "there are none; add a [[recordings]] table".into()));
         }
         for (i, recording) in self.recordings.iter().enumerate() {
             let name = &recording.name;
             let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
             if name.is_empty() || name.starts_with('.') || !name.chars().all(plain) {
-                return Err(value("recordings.name", format!("`{name}` cannot be the name of a file")));
+                return Err(value_error("recordings.name", format!("`{name}` cannot be the name of a file")));
             }
             if self.recordings[..i].iter().any(|other| other.name == *name) {
-                return Err(value("recordings.name", format!("`{name}` occurs twice")));
+                return Err(value_error("recordings.name", format!("`{name}` occurs twice")));
             }
-            not_negative("recordings.load_kg", recording.load_kg)?;
+            check_not_negative("recordings.load_kg", recording.load_kg)?;
         }
         Ok(())
     }
@@ -228,44 +231,52 @@ fn is_default<T: Default + PartialEq>(v: &T) -> bool {
 }
 
 /// Degrees of freedom of Student's t.
-fn tail(key: &str, degrees: f64) -> Result<(), LabError> {
+fn check_tail_degrees(key: &str, degrees: f64) -> Result<(), LabError> {
     if degrees == 0.0 || (degrees.is_finite() && degrees > 2.0) {
         return Ok(());
     }
-    Err(value(key, "must be 0 (normal) or above 2, where Student's t has a variance".into()))
+    Err(value_error(key, "must be 0 (normal) or above 2, where Student's t has a variance".into()))
 }
 
 /// What a TOML file says.
-pub(crate) fn parse<T: DeserializeOwned>(what: &'static str, text: &str, path: &Path) -> Result<T, LabError> {
+pub(crate) fn parse_toml<T: DeserializeOwned>(
+    what: &'static str,
+    text: &str,
+    path: &Path,
+) -> Result<T, LabError> {
     let refused = |source| LabError::Parse { what, path: path.to_owned(), source: Box::new(source) };
     toml::from_str(text).map_err(refused)
 }
 
-pub(crate) fn value(key: &str, why: String) -> LabError {
+pub(crate) fn value_error(key: &str, why: String) -> LabError {
     LabError::Value { key: key.to_owned(), why }
 }
 
-pub(crate) fn positive(key: &str, v: f64) -> Result<(), LabError> {
-    if v.is_finite() && v > 0.0 { Ok(()) } else { Err(value(key, format!("must be above 0, is {v}"))) }
+pub(crate) fn check_positive(key: &str, v: f64) -> Result<(), LabError> {
+    if v.is_finite() && v > 0.0 { Ok(()) } else { Err(value_error(key, format!("must be above 0, is {v}"))) }
 }
 
-pub(crate) fn not_negative(key: &str, v: f64) -> Result<(), LabError> {
-    if v.is_finite() && v >= 0.0 { Ok(()) } else { Err(value(key, format!("must not be negative, is {v}"))) }
+pub(crate) fn check_not_negative(key: &str, v: f64) -> Result<(), LabError> {
+    if v.is_finite() && v >= 0.0 {
+        Ok(())
+    } else {
+        Err(value_error(key, format!("must not be negative, is {v}")))
+    }
 }
 
-pub(crate) fn share(key: &str, v: f64) -> Result<(), LabError> {
+pub(crate) fn check_share(key: &str, v: f64) -> Result<(), LabError> {
     if (0.0..=1.0).contains(&v) {
         Ok(())
     } else {
-        Err(value(key, format!("must lie between 0 and 1, is {v}")))
+        Err(value_error(key, format!("must lie between 0 and 1, is {v}")))
     }
 }
 
-pub(crate) fn range(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
+pub(crate) fn check_range(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
     if low.is_finite() && high.is_finite() && low <= high {
         return Ok(());
     }
-    Err(value(key, format!("must be [smallest, largest], is [{low}, {high}]")))
+    Err(value_error(key, format!("must be [smallest, largest], is [{low}, {high}]")))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Encoders, motion capture, thermometer, and the clocks and transport of their messages.
 
-use super::{not_negative, positive, range, share, tail, value};
+use super::{check_not_negative, check_positive, check_range, check_share, check_tail_degrees, value_error};
 use crate::LabError;
 use serde::{Deserialize, Serialize};
 
@@ -326,21 +326,21 @@ impl EncoderConfig {
     }
 
     pub(crate) fn check(&self) -> Result<(), LabError> {
-        rate("joints.rate_hz", self.rate_hz)?;
-        positive("joints.counts_per_turn", self.counts_per_turn)?;
-        not_negative("joints.noise_counts", self.noise_counts)?;
+        check_rate("joints.rate_hz", self.rate_hz)?;
+        check_positive("joints.counts_per_turn", self.counts_per_turn)?;
+        check_not_negative("joints.noise_counts", self.noise_counts)?;
         self.transport.check("joints.transport")?;
         let joints = self.names.len();
         if !self.direction.is_empty()
             && (self.direction.len() != joints || self.direction.iter().any(|d| d.abs() != 1))
         {
-            return Err(value(
+            return Err(value_error(
                 "joints.direction",
                 format!("must be +1 or -1 for each of {joints} joints, or empty"),
             ));
         }
         if !self.zero_counts.is_empty() && self.zero_counts.len() != joints {
-            return Err(value("joints.zero_counts", format!("must have {joints} entries or none")));
+            return Err(value_error("joints.zero_counts", format!("must have {joints} entries or none")));
         }
         Ok(())
     }
@@ -348,9 +348,9 @@ impl EncoderConfig {
 
 impl TransportConfig {
     fn check(&self, key: &str) -> Result<(), LabError> {
-        not_negative(&format!("{key}.period_jitter_ms"), self.period_jitter_ms)?;
-        not_negative(&format!("{key}.shortest_ms"), self.shortest_ms)?;
-        not_negative(&format!("{key}.mean_extra_ms"), self.mean_extra_ms)
+        check_not_negative(&format!("{key}.period_jitter_ms"), self.period_jitter_ms)?;
+        check_not_negative(&format!("{key}.shortest_ms"), self.shortest_ms)?;
+        check_not_negative(&format!("{key}.mean_extra_ms"), self.mean_extra_ms)
     }
 }
 
@@ -361,36 +361,36 @@ impl ViconConfig {
     }
 
     pub(super) fn check(&self) -> Result<(), LabError> {
-        not_negative("vicon.noise_95_mm", self.noise_95_mm)?;
-        tail("vicon.tail_degrees", self.tail_degrees)?;
-        positive("vicon.tail_s", self.tail_s)?;
-        not_negative("vicon.swaps_per_minute", self.swaps_per_minute)?;
-        positive("vicon.swap_s", self.swap_s)?;
-        not_negative("vicon.swap_mm", self.swap_mm)?;
-        share("vicon.correlated_share", self.correlated_share)?;
-        positive("vicon.correlation_s", self.correlation_s)?;
-        not_negative("vicon.base_mount_sigma_mm", self.base_mount_sigma_mm)?;
-        not_negative("vicon.base_mount_sigma_deg", self.base_mount_sigma_deg)?;
+        check_not_negative("vicon.noise_95_mm", self.noise_95_mm)?;
+        check_tail_degrees("vicon.tail_degrees", self.tail_degrees)?;
+        check_positive("vicon.tail_s", self.tail_s)?;
+        check_not_negative("vicon.swaps_per_minute", self.swaps_per_minute)?;
+        check_positive("vicon.swap_s", self.swap_s)?;
+        check_not_negative("vicon.swap_mm", self.swap_mm)?;
+        check_share("vicon.correlated_share", self.correlated_share)?;
+        check_positive("vicon.correlation_s", self.correlation_s)?;
+        check_not_negative("vicon.base_mount_sigma_mm", self.base_mount_sigma_mm)?;
+        check_not_negative("vicon.base_mount_sigma_deg", self.base_mount_sigma_deg)?;
         let clock = &self.clock;
-        not_negative("vicon.clock.offset_sigma_ms", clock.offset_sigma_ms)?;
-        not_negative("vicon.clock.drift_sigma_ppm", clock.drift_sigma_ppm)?;
-        not_negative("vicon.clock.latency_ms", clock.latency_ms)?;
-        not_negative("vicon.clock.stamp_jitter_ms", clock.stamp_jitter_ms)?;
+        check_not_negative("vicon.clock.offset_sigma_ms", clock.offset_sigma_ms)?;
+        check_not_negative("vicon.clock.drift_sigma_ppm", clock.drift_sigma_ppm)?;
+        check_not_negative("vicon.clock.latency_ms", clock.latency_ms)?;
+        check_not_negative("vicon.clock.stamp_jitter_ms", clock.stamp_jitter_ms)?;
         clock.transport.check("vicon.clock.transport")?;
-        range("vicon.clock.offset_ms", [clock.offset_ms, 1e6])?;
-        range("vicon.clock.drift_ppm", [clock.drift_ppm, 1e5])?;
+        check_range("vicon.clock.offset_ms", [clock.offset_ms, 1e6])?;
+        check_range("vicon.clock.drift_ppm", [clock.drift_ppm, 1e5])?;
         let markers: Vec<(String, BodyConfig)> =
             self.markers.iter().map(|m| (format!("markers {}", m.subject), m.body())).collect();
         let markers = markers.iter().map(|(key, body)| (key.as_str(), body));
         let subjects = [("tip", &self.tip), ("table", &self.table), ("base", &self.base)];
         for (key, body) in subjects.into_iter().chain(markers) {
             if body.subject.is_empty() {
-                return Err(value(&format!("vicon.{key}.subject"), "is empty; name it".to_owned()));
+                return Err(value_error(&format!("vicon.{key}.subject"), "is empty; name it".to_owned()));
             }
-            rate(&format!("vicon.{key}.rate_hz"), body.rate_hz)?;
-            not_negative(&format!("vicon.{key}.rotation_sigma_deg"), body.rotation_sigma_deg)?;
-            not_negative(&format!("vicon.{key}.occlusions_per_minute"), body.occlusions_per_minute)?;
-            not_negative(&format!("vicon.{key}.occlusion_s"), body.occlusion_s)?;
+            check_rate(&format!("vicon.{key}.rate_hz"), body.rate_hz)?;
+            check_not_negative(&format!("vicon.{key}.rotation_sigma_deg"), body.rotation_sigma_deg)?;
+            check_not_negative(&format!("vicon.{key}.occlusions_per_minute"), body.occlusions_per_minute)?;
+            check_not_negative(&format!("vicon.{key}.occlusion_s"), body.occlusion_s)?;
         }
         Ok(())
     }
@@ -403,15 +403,15 @@ impl TemperatureConfig {
     }
 
     pub(super) fn check(&self) -> Result<(), LabError> {
-        rate("temperature.rate_hz", self.rate_hz)?;
-        positive("temperature.time_constant_s", self.time_constant_s)?;
-        not_negative("temperature.noise_k", self.noise_k)
+        check_rate("temperature.rate_hz", self.rate_hz)?;
+        check_positive("temperature.time_constant_s", self.time_constant_s)?;
+        check_not_negative("temperature.noise_k", self.noise_k)
     }
 }
 
-fn rate(key: &str, hz: f64) -> Result<(), LabError> {
-    positive(key, hz)?;
-    if hz > 5000.0 { Err(value(key, format!("{hz} Hz is more than the lab's 5000"))) } else { Ok(()) }
+fn check_rate(key: &str, hz: f64) -> Result<(), LabError> {
+    check_positive(key, hz)?;
+    if hz > 5000.0 { Err(value_error(key, format!("{hz} Hz is more than the lab's 5000"))) } else { Ok(()) }
 }
 
 // Keys at their defaults stay out of the truth file.

@@ -1,6 +1,6 @@
 //! What the arm does, and how the hand that seats it behaves.
 
-use super::{not_negative, positive, range, share, tail, value};
+use super::{check_not_negative, check_positive, check_range, check_share, check_tail_degrees, value_error};
 use crate::LabError;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -244,22 +244,25 @@ impl Default for HandConfig {
 
 impl TaskConfig {
     pub(super) fn check(&self) -> Result<(), LabError> {
-        share("task.skip_share", self.skip_share)?;
-        share("task.swap_share", self.swap_share)?;
-        self.passes.iter().try_for_each(|pass| share("task.passes.share", pass.share))?;
-        not_negative("task.transit_height_mm", self.transit_height_mm)?;
-        positive("task.speed_m_s", self.speed_m_s)?;
-        not_negative("task.home_s", self.home_s)?;
-        positive("task.free.speed_m_s", self.free.speed_m_s)?;
-        pause("task.free.hold_s", self.free.hold_s)?;
-        self.free.range_deg.iter().try_for_each(|r| range("task.free.range_deg", *r))?;
-        positive("task.sweep.speed_m_s", self.sweep.speed_m_s)?;
+        check_share("task.skip_share", self.skip_share)?;
+        check_share("task.swap_share", self.swap_share)?;
+        self.passes.iter().try_for_each(|pass| check_share("task.passes.share", pass.share))?;
+        check_not_negative("task.transit_height_mm", self.transit_height_mm)?;
+        check_positive("task.speed_m_s", self.speed_m_s)?;
+        check_not_negative("task.home_s", self.home_s)?;
+        check_positive("task.free.speed_m_s", self.free.speed_m_s)?;
+        check_pause("task.free.hold_s", self.free.hold_s)?;
+        self.free.range_deg.iter().try_for_each(|r| check_range("task.free.range_deg", *r))?;
+        check_positive("task.sweep.speed_m_s", self.sweep.speed_m_s)?;
         for told in &self.set_points {
-            pause("task.set_points.hold_s", [0.0, told.hold_s])?;
-            positive("task.set_points.speed_deg_s", told.speed_deg_s)?;
+            check_pause("task.set_points.hold_s", [0.0, told.hold_s])?;
+            check_positive("task.set_points.speed_deg_s", told.speed_deg_s)?;
         }
         if !(1.0..=500.0).contains(&self.set_point_hz) {
-            return Err(value("task.set_point_hz", format!("must lie in 1..500, is {}", self.set_point_hz)));
+            return Err(value_error(
+                "task.set_point_hz",
+                format!("must lie in 1..500, is {}", self.set_point_hz),
+            ));
         }
         Ok(())
     }
@@ -267,28 +270,28 @@ impl TaskConfig {
 
 impl HandConfig {
     pub(super) fn check(&self) -> Result<(), LabError> {
-        range("hand.hover_height_mm", self.hover_height_mm)?;
-        share("hand.hover_share", self.hover_share)?;
-        pause("hand.hover_s", self.hover_s)?;
-        range("hand.slide_mm", self.slide_mm)?;
-        not_negative("hand.slide_spread_deg", self.slide_spread_deg)?;
-        pause("hand.move_s", self.move_s)?;
-        pause("hand.rattle_s", self.rattle_s)?;
-        pause("hand.seated_s", self.seated_s)?;
-        not_negative("hand.tremor_mm", self.tremor_mm)?;
-        not_negative("hand.rattle_mm", self.rattle_mm)?;
-        not_negative("hand.seated_tremor_mm", self.seated_tremor_mm)?;
-        share("hand.seat_correlation", self.seat_correlation)?;
-        tail("hand.seat_tail_degrees", self.seat_tail_degrees)?;
-        positive("hand.tremor_s", self.tremor_s)
+        check_range("hand.hover_height_mm", self.hover_height_mm)?;
+        check_share("hand.hover_share", self.hover_share)?;
+        check_pause("hand.hover_s", self.hover_s)?;
+        check_range("hand.slide_mm", self.slide_mm)?;
+        check_not_negative("hand.slide_spread_deg", self.slide_spread_deg)?;
+        check_pause("hand.move_s", self.move_s)?;
+        check_pause("hand.rattle_s", self.rattle_s)?;
+        check_pause("hand.seated_s", self.seated_s)?;
+        check_not_negative("hand.tremor_mm", self.tremor_mm)?;
+        check_not_negative("hand.rattle_mm", self.rattle_mm)?;
+        check_not_negative("hand.seated_tremor_mm", self.seated_tremor_mm)?;
+        check_share("hand.seat_correlation", self.seat_correlation)?;
+        check_tail_degrees("hand.seat_tail_degrees", self.seat_tail_degrees)?;
+        check_positive("hand.tremor_s", self.tremor_s)
     }
 }
 
 /// A range of durations: ordered, not negative, and short enough that a slip of the pen does not fill memory.
-fn pause(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
-    range(key, [low, high])?;
-    not_negative(key, low)?;
-    if high > 3600.0 { Err(value(key, format!("{high} s is more than an hour"))) } else { Ok(()) }
+fn check_pause(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
+    check_range(key, [low, high])?;
+    check_not_negative(key, low)?;
+    if high > 3600.0 { Err(value_error(key, format!("{high} s is more than an hour"))) } else { Ok(()) }
 }
 
 fn set_point() -> String {

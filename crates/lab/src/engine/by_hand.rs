@@ -1,6 +1,6 @@
 //! Motion led by a hand: the links move, and the motors follow through the gears.
 
-use super::{Engine, Pace, QUICK_REST_STEPS, QUICK_STEP_S, SHORTEST_SECTION_S, steps};
+use super::{Engine, Pace, QUICK_REST_STEPS, QUICK_STEP_S, SHORTEST_SECTION_S, step_count};
 use crate::LabError;
 use crate::hand::minimum_jerk;
 use crate::trace::{Rest, STEP_S};
@@ -79,7 +79,7 @@ impl Engine<'_> {
     /// How many steps a movement of the hand takes, and how long each.
     fn hand_steps(&self, duration_s: f64, quick_s: f64) -> (usize, f64) {
         match self.pace {
-            Pace::Full => (steps(duration_s).max(1), STEP_S),
+            Pace::Full => (step_count(duration_s).max(1), STEP_S),
             Pace::Quick => {
                 let count = (duration_s / quick_s).round().max(1.0);
                 (count as usize, duration_s / count)

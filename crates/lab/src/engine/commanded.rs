@@ -1,7 +1,7 @@
 //! Motion along set-points in joint space, as a controller is told them from outside.
 
 use super::quickly::STEPS_A_ROW;
-use super::{Engine, Pace, SHORTEST_SECTION_S, steps};
+use super::{Engine, Pace, SHORTEST_SECTION_S, step_count};
 use crate::hand::minimum_jerk;
 use crate::trace::STEP_S;
 
@@ -40,7 +40,7 @@ impl Engine<'_> {
     fn command(&mut self, duration_s: f64, at: impl Fn(f64) -> Vec<f64>) {
         // How far a joint swings beyond its target decides on which flank of a gap it comes to rest.
         self.swinging = true;
-        let steps = steps(duration_s).max(1);
+        let steps = step_count(duration_s).max(1);
         if self.pace == Pace::Quick {
             for done in (0..steps).step_by(STEPS_A_ROW) {
                 let ahead = (done + STEPS_A_ROW).min(steps);

@@ -2,7 +2,7 @@
 //! everything after that moment.
 
 use super::*;
-use crate::screw::turn;
+use crate::screw::rotate_vector;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 
 /// `kind = "bump"`.
@@ -58,7 +58,7 @@ impl Bump {
     /// Whether it has happened to `body`; a bump of no size never does.
     fn hit(&self, now: &RigState<'_>, body: BumpedBody) -> bool {
         let moved = self.shift_mm.iter().chain(&self.turn_deg).any(|v| *v != 0.0);
-        moved && self.body == body && happened(now, self.recording, self.at_s, self.until_s)
+        moved && self.body == body && event_holds(now, self.recording, self.at_s, self.until_s)
     }
 }
 
@@ -71,7 +71,7 @@ impl Mechanism for Bump {
         arm.tip_m += shift;
         let by = Matrix3::from_columns(&arm.tip_axes) * Vector3::from(self.turn_deg.map(f64::to_radians));
         if let Some(axis) = by.try_normalize(0.0) {
-            arm.tip_axes = arm.tip_axes.map(|direction| turn(&axis, &direction, by.norm()));
+            arm.tip_axes = arm.tip_axes.map(|direction| rotate_vector(&axis, &direction, by.norm()));
         }
     }
 

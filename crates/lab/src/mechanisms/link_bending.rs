@@ -3,7 +3,7 @@
 //! The beam is cut into slices; each bends by its moment over its stiffness, and the slopes add up to the end.
 
 use super::*;
-use crate::screw::{Line, turn};
+use crate::screw::{Line, rotate_vector};
 
 /// Slices of the beam.
 const SLICES: usize = 48;
@@ -46,8 +46,8 @@ impl LinkBending {
 
     pub(super) fn sag(&self, now: &RigState<'_>, arm: &AxisArm) -> Sag {
         let link = self.link - 1;
-        let pull =
-            (0..=link).fold(*now.gravity_m_s2, |v, j| turn(&arm.axes[j].direction, &v, -now.link_rad[j]));
+        let pull = (0..=link)
+            .fold(*now.gravity_m_s2, |v, j| rotate_vector(&arm.axes[j].direction, &v, -now.link_rad[j]));
         let [force, moment] = self.end_load(now, arm, &pull);
         let beam = arm.link_m(link);
         let (length, along) = (beam.norm(), beam.normalize());

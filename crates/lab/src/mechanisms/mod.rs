@@ -93,7 +93,7 @@ pub use zero_slip::ZeroSlip;
 
 use crate::arm::AxisArm;
 use crate::board::Board;
-use crate::config::{not_negative, positive, value};
+use crate::config::{check_not_negative, check_positive, value_error};
 use crate::mechanism::{Body, Named};
 use crate::{LabError, Mechanism, RigState};
 use armcal_core::Pose;
@@ -187,7 +187,7 @@ pub struct Keys {
 
 impl Keys {
     fn wrong(&self, key: &str, why: String) -> LabError {
-        value(&self.path(key), why)
+        value_error(&self.path(key), why)
     }
 
     fn path(&self, key: &str) -> String {
@@ -223,11 +223,11 @@ impl Keys {
     }
 
     fn stiff(&self, key: &str, v: f64) -> Result<(), LabError> {
-        positive(&self.path(key), v)
+        check_positive(&self.path(key), v)
     }
 
     fn not_negative(&self, key: &str, v: f64) -> Result<(), LabError> {
-        not_negative(&self.path(key), v)
+        check_not_negative(&self.path(key), v)
     }
 
     fn event(&self, recording: usize, at_s: f64, until_s: Option<f64>) -> Result<(), LabError> {
@@ -261,7 +261,7 @@ fn motor_of_play(now: &RigState<'_>, before: Option<[f64; 2]>, link_rad: f64, ha
 const STILL_RAD: f64 = 1e-9;
 
 /// Whether something that happens `at_s` into a recording, and is put back `until_s` into it, holds now.
-fn happened(now: &RigState<'_>, recording: usize, at_s: f64, until_s: Option<f64>) -> bool {
+fn event_holds(now: &RigState<'_>, recording: usize, at_s: f64, until_s: Option<f64>) -> bool {
     let reached = |time_s| now.recording > recording || (now.recording == recording && now.time_s >= time_s);
     reached(at_s) && !until_s.is_some_and(reached)
 }

@@ -1,7 +1,7 @@
 //! A worn bearing: the axis of a joint nods as the joint turns, round a small circle in the frame it is held in.
 
 use super::*;
-use crate::screw::{Line, turn};
+use crate::screw::{Line, rotate_vector};
 
 /// `kind = "axis_wobble"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,9 +25,9 @@ impl Mechanism for AxisWobble {
         let q = now.link_rad[joint];
         let seed = if axis.direction.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
         let across = axis.direction.cross(&seed).normalize();
-        let lean = turn(&axis.direction, &across, self.per_turn * q + self.phase_deg.to_radians());
+        let lean = rotate_vector(&axis.direction, &across, self.per_turn * q + self.phase_deg.to_radians());
         // The lean is held by the link before; the link itself has turned by q under it.
-        let direction = turn(&axis.direction, &lean, -q);
+        let direction = rotate_vector(&axis.direction, &lean, -q);
         arm.turn_beyond(joint, &Line { point_m: axis.point_m, direction }, self.tilt_deg.to_radians());
     }
 }

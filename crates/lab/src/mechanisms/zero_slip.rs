@@ -23,7 +23,7 @@ pub struct ZeroSlip {
 
 impl Mechanism for ZeroSlip {
     fn ahead(&mut self, now: &RigState<'_>, _joint_rad: &[f64]) -> Option<(usize, f64)> {
-        let slipped = happened(now, self.recording, self.at_s, self.until_s);
+        let slipped = event_holds(now, self.recording, self.at_s, self.until_s);
         slipped.then(|| (self.joint, self.slip_deg.to_radians()))
     }
 }

@@ -3,7 +3,10 @@
 use super::drives::acts_on_drives;
 use super::torso::TorsoConfig;
 use crate::LabError;
-use crate::config::{DeviationConfig, DhRow, EncoderConfig, not_negative, parse, positive, range, value};
+use crate::config::{
+    DeviationConfig, DhRow, EncoderConfig, check_not_negative, check_positive, check_range, parse_toml,
+    value_error,
+};
 use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
@@ -117,7 +120,7 @@ impl Default for PairTaskConfig {
 impl PairConfig {
     /// Reads and checks a lab file.
     pub fn from_toml(text: &str, path: &Path) -> Result<PairConfig, LabError> {
-        let config: PairConfig = parse("lab file", text, path)?;
+        let config: PairConfig = parse_toml("lab file", text, path)?;
         config.check()?;
         Ok(config)
     }
@@ -137,31 +140,37 @@ impl PairConfig {
         self.arms.iter().try_for_each(|arm| arm.check(self.recordings.len()))?;
         self.torso.iter().try_for_each(|torso| torso.check(self.recordings.len()))?;
         if self.arms[0].name == self.arms[1].name || self.arms[0].joints.topic == self.arms[1].joints.topic {
-            return Err(value("arms", "the two need names and topics of their own".into()));
+            return Err(value_error("arms", "the two need names and topics of their own".into()));
         }
         if let Some(length_mm) = self.joined.length_mm {
-            positive("joined.length_mm", length_mm)?;
+            check_positive("joined.length_mm", length_mm)?;
         }
-        not_negative("joined.length_sigma_mm", self.joined.length_sigma_mm)?;
-        not_negative("joined.slip_sigma_mm", self.joined.slip_sigma_mm)?;
+        check_not_negative("joined.length_sigma_mm", self.joined.length_sigma_mm)?;
+        check_not_negative("joined.slip_sigma_mm", self.joined.slip_sigma_mm)?;
         let task = &self.task;
-        task.region_m.iter().try_for_each(|r| range("task.region_m", *r))?;
+        task.region_m.iter().try_for_each(|r| check_range("task.region_m", *r))?;
         for (key, seconds) in [("task.rest_s", task.rest_s), ("task.move_s", task.move_s)] {
-            range(key, seconds)?;
-            positive(key, seconds[0])?;
+            check_range(key, seconds)?;
+            check_positive(key, seconds[0])?;
         }
-        not_negative("task.tremor_mm", task.tremor_mm)?;
+        check_not_negative("task.tremor_mm", task.tremor_mm)?;
         if self.recordings.is_empty() {
-            return Err(value("recordings", "there are none; name at least one".into()));
+            return Err(value_error("recordings", "there are none; name at least one".into()));
         }
         for (i, name) in self.recordings.iter().enumerate() {
             let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_');
             if name.is_empty() || !name.chars().all(plain) || self.recordings[..i].contains(name) {
-                return Err(value("recordings", format!("`{name}` cannot be the name of another file")));
+                return Err(value_error(
+                    "recordings",
+                    format!("`{name}` cannot be the name of another file"),
+                ));
             }
         }
         if self.start_unix_s > 2_100_000_000 {
-            return Err(value("start_unix_s", "lies beyond 2036; give seconds, not milliseconds".into()));
+            return Err(value_error(
+                "start_unix_s",
+                "lies beyond 2036; give seconds, not milliseconds".into(),
+            ));
         }
         Ok(())
     }
@@ -174,28 +183,28 @@ impl PairArmConfig {
             [("arms.home_deg", self.home_deg.len()), ("arms.joints.names", self.joints.names.len())]
         {
             if size != joints || joints == 0 {
-                return Err(value(key, format!("has {size} entries for an arm of {joints} joints")));
+                return Err(value_error(key, format!("has {size} entries for an arm of {joints} joints")));
             }
         }
         if !self.rows[0].joint {
-            return Err(value(
+            return Err(value_error(
                 "arms.rows",
                 "the first row must be a joint; put a fixed base into `base`".into(),
             ));
         }
         let rows = self.rows.iter().flat_map(|r| [r.theta_deg, r.d_m, r.a_m, r.alpha_deg]);
         if !rows.chain(self.home_deg.iter().copied()).all(f64::is_finite) {
-            return Err(value("arms", format!("`{}` has a number that is not finite", self.name)));
+            return Err(value_error("arms", format!("`{}` has a number that is not finite", self.name)));
         }
-        not_negative("arms.link_kg", self.link_kg)?;
+        check_not_negative("arms.link_kg", self.link_kg)?;
         for (table, mechanism) in self.mechanisms.iter().enumerate() {
             acts_on_drives(mechanism)?;
             mechanism.hidden().check(&Keys { table, joints, recordings, markers: 0 })?;
         }
-        not_negative("arms.deviation.length_mm", self.deviation.length_mm)?;
-        not_negative("arms.deviation.angle_deg", self.deviation.angle_deg)?;
-        not_negative("arms.placement_sigma_mm", self.placement_sigma_mm)?;
-        not_negative("arms.placement_sigma_deg", self.placement_sigma_deg)?;
+        check_not_negative("arms.deviation.length_mm", self.deviation.length_mm)?;
+        check_not_negative("arms.deviation.angle_deg", self.deviation.angle_deg)?;
+        check_not_negative("arms.placement_sigma_mm", self.placement_sigma_mm)?;
+        check_not_negative("arms.placement_sigma_deg", self.placement_sigma_deg)?;
         self.joints.check()
     }
 }

@@ -77,5 +77,5 @@ pub(super) fn acts_on_drives(mechanism: &MechanismConfig) -> Result<(), LabError
             | WarmUp(_)
     );
     let why = "acts on links, frames or cameras; an arm of a pair takes what is in its drives and encoders";
-    if elsewhere { Err(crate::config::value("arms.mechanisms", why.to_owned())) } else { Ok(()) }
+    if elsewhere { Err(crate::config::value_error("arms.mechanisms", why.to_owned())) } else { Ok(()) }
 }

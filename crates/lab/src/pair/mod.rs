@@ -18,7 +18,7 @@ pub use truth::{PairArmTruth, PairDwellTruth, PairRecordingTruth, PairTruth};
 
 use crate::arm::AxisArm;
 use crate::config::DhRow;
-use crate::quick::encoders;
+use crate::quick::mean_encoder_readings;
 use crate::random::{Purpose, Stream};
 use crate::rig::{build_rows, small_motion};
 use crate::truth::write_json;
@@ -66,7 +66,7 @@ pub fn simulate(config: &PairConfig, out_dir: &Path) -> Result<Simulated<PairTru
     let mut recordings = Vec::new();
     for (recording, name) in config.recordings.iter().enumerate() {
         let motion = Motion::perform(config, &pair, recording)?;
-        let log = recorded::log(config, &pair, &motion, recording)?;
+        let log = recorded::pair_log(config, &pair, &motion, recording)?;
         let path = out_dir.join(crate::recording_file(name));
         crate::record::write(&path, &config.name, name, &log)?;
         truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
@@ -81,7 +81,7 @@ pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
     config.check()?;
     if config.carriers().iter().any(|arm| !arm.mechanisms.is_empty()) {
         let why = "what is in the drives depends on the way to a rest: simulate a recording".to_owned();
-        return Err(crate::config::value("arms.mechanisms", why));
+        return Err(crate::config::value_error("arms.mechanisms", why));
     }
     let pair = Pair::build(config);
     let mut truth = PairTruth::of_pair(config, &pair);
@@ -96,7 +96,11 @@ pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
             dwells.push([0, 1].map(|arm: usize| {
                 let joints = &config.arms[arm].joints;
                 let readings = (rest.end_s - rest.start_s) * joints.rate_hz;
-                observation(id, time_ns, encoders(joints, &rest.to_rad[arm], readings, &mut draw))
+                joined_observation(
+                    id,
+                    time_ns,
+                    mean_encoder_readings(joints, &rest.to_rad[arm], readings, &mut draw),
+                )
             }));
         }
         truth.recordings.push(PairRecordingTruth::of_motion(config, &motion, recording));
@@ -148,7 +152,11 @@ impl BuiltArm {
     }
 }
 
-fn observation(dwell: DwellId, time_ns: i64, [joint_rad, joint_sigma_rad]: [Vec<f64>; 2]) -> Observation {
+fn joined_observation(
+    dwell: DwellId,
+    time_ns: i64,
+    [joint_rad, joint_sigma_rad]: [Vec<f64>; 2],
+) -> Observation {
     let bare = Observation::bare(dwell, joint_rad, Reference::position(Vector3::zeros()));
     Observation { time_ns, joint_sigma_rad, ..bare }
 }

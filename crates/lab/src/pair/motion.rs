@@ -187,7 +187,13 @@ impl Motion {
 
 /// Joint angles of an arm at the end of the way to a grip [rad], walked in steps, so that the elbow stays on its side; what
 /// is missing [m] where a step, tremor included, is out of reach.
-fn walk(pair: &Pair, arm: usize, before: Option<&Pose>, to: &Grip, home: &[f64]) -> Result<Vec<f64>, f64> {
+fn walk_to_grip(
+    pair: &Pair,
+    arm: usize,
+    before: Option<&Pose>,
+    to: &Grip,
+    home: &[f64],
+) -> Result<Vec<f64>, f64> {
     let built = &pair.arms[arm];
     let start_rad = before.map_or(home, |(_, q)| &q[arm]);
     let start_m = built.tip_in_world(start_rad);
@@ -218,7 +224,7 @@ fn draw_pose(
         let direction = draw.normal3().normalize();
         let slip_m = draw.normal3() * (config.joined.slip_sigma_mm * 1e-3);
         let grip = Grip { point_m, direction, slip_m };
-        match [0, 1].map(|arm| walk(pair, arm, before, &grip, &home[arm])) {
+        match [0, 1].map(|arm| walk_to_grip(pair, arm, before, &grip, &home[arm])) {
             [Ok(first), Ok(second)] => {
                 if first.iter().chain(&second).all(|q| q.abs() < WIDEST_RAD) {
                     return Ok((grip, [first, second]));

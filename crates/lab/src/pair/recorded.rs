@@ -5,12 +5,12 @@ use super::motion::Motion;
 use super::{Pair, PairConfig, torso};
 use crate::LabError;
 use crate::random::{Purpose, Stream};
-use crate::sensors::encoder::payload;
+use crate::sensors::encoder::joint_payload;
 use crate::sensors::transport::Transport;
 use crate::sensors::{Kind, Log, Message, SensorClock};
 
 /// Records a motion.
-pub(crate) fn log(
+pub(crate) fn pair_log(
     config: &PairConfig,
     pair: &Pair,
     motion: &Motion,
@@ -67,7 +67,7 @@ fn joint_states(
             .collect();
         let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
         let log_ns = transport.log_ns(stamp_ns);
-        let payload = payload(joints, &counts, &[]);
+        let payload = joint_payload(joints, &counts, &[]);
         log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use super::motion::Motion;
 use super::{Pair, PairArmConfig, PairConfig};
-use crate::config::{not_negative, positive, range, value};
+use crate::config::{check_not_negative, check_positive, check_range, value_error};
 use crate::random::{Purpose, Stream};
 use crate::sensors::transport::Transport;
 use crate::sensors::{Kind, Log, Message, Payload};
@@ -39,13 +39,13 @@ pub struct TipsSeenConfig {
 
 impl TorsoConfig {
     pub(super) fn check(&self, recordings: usize) -> Result<(), LabError> {
-        range("torso.range_deg", self.range_deg)?;
+        check_range("torso.range_deg", self.range_deg)?;
         if self.arm.home_deg.len() != 1 {
-            return Err(value("torso.arm.home_deg", "is not of one joint; a torso has one".into()));
+            return Err(value_error("torso.arm.home_deg", "is not of one joint; a torso has one".into()));
         }
         if let Some(seen) = &self.seen {
-            positive("torso.seen.rate_hz", seen.rate_hz)?;
-            not_negative("torso.seen.sigma_mm", seen.sigma_mm)?;
+            check_positive("torso.seen.rate_hz", seen.rate_hz)?;
+            check_not_negative("torso.seen.sigma_mm", seen.sigma_mm)?;
         }
         self.arm.check(recordings)
     }

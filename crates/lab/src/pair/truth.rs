@@ -2,7 +2,7 @@
 
 use super::motion::Motion;
 use super::{Pair, PairConfig};
-use crate::truth::{Deviation, PoseTruth, deviations};
+use crate::truth::{Deviation, PoseTruth, row_deviations};
 use serde::{Deserialize, Serialize};
 
 /// Everything that was true.
@@ -62,7 +62,7 @@ impl PairTruth {
             let prefixed = |d: Deviation| Deviation { name: format!("{}.{}", drawn.name, d.name), ..d };
             PairArmTruth {
                 name: drawn.name.clone(),
-                deviations: deviations(&drawn.rows, &built.rows).into_iter().map(prefixed).collect(),
+                deviations: row_deviations(&drawn.rows, &built.rows).into_iter().map(prefixed).collect(),
                 world_from_base: (&built.world_from_base).into(),
             }
         });

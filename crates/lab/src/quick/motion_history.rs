@@ -9,7 +9,7 @@ const AWAY_RAD: f64 = 0.3 * std::f64::consts::PI / 180.0;
 const WIDEST_RAD: f64 = 0.25;
 
 /// Direction of arrival of each joint at `rest_rad`.
-pub fn arrivals(before: &[Vec<f64>], rest_rad: &[f64], count_rad: f64) -> Vec<Arrival> {
+pub fn arrival_directions(before: &[Vec<f64>], rest_rad: &[f64], count_rad: f64) -> Vec<Arrival> {
     let away = AWAY_RAD.max(3.0 * count_rad);
     let from = |(joint, rest): (usize, &f64)| {
         let moves = before.iter().rev().map(|row| rest - row[joint]);
@@ -23,9 +23,9 @@ pub fn arrivals(before: &[Vec<f64>], rest_rad: &[f64], count_rad: f64) -> Vec<Ar
 }
 
 /// Turning points of each joint that no later and wider swing has wiped out, oldest first, the rest last [rad].
-pub fn memories(before: &[Vec<f64>], rest_rad: &[f64], count_rad: f64) -> Vec<Vec<f64>> {
+pub fn path_memories(before: &[Vec<f64>], rest_rad: &[f64], count_rad: f64) -> Vec<Vec<f64>> {
     let still = (0.1 * AWAY_RAD).max(3.0 * count_rad);
-    let of = |(joint, rest): (usize, &f64)| memory(before, |row| row[joint], *rest, still);
+    let of = |(joint, rest): (usize, &f64)| turning_points_rad(before, |row| row[joint], *rest, still);
     rest_rad.iter().enumerate().map(of).collect()
 }
 
@@ -34,17 +34,22 @@ pub fn pair_memories(before: &[Vec<f64>], rest_rad: &[f64], count_rad: f64) -> V
     let still = (0.1 * AWAY_RAD).max(6.0 * count_rad);
     let of = |joint: usize, sense: f64| {
         let together = |row: &[f64]| row[joint] + sense * row[joint - 1];
-        memory(before, together, together(rest_rad), still)
+        turning_points_rad(before, together, together(rest_rad), still)
     };
     (1..rest_rad.len()).map(|joint| [of(joint, 1.0), of(joint, -1.0)]).collect()
 }
 
 /// How far each joint has come from its last rest [rad].
-pub fn moved(from_rad: &[f64], rest_rad: &[f64]) -> Vec<f64> {
+pub fn joint_moves_rad(from_rad: &[f64], rest_rad: &[f64]) -> Vec<f64> {
     rest_rad.iter().zip(from_rad).map(|(rest, from)| rest - from).collect()
 }
 
-fn memory(before: &[Vec<f64>], of: impl Fn(&[f64]) -> f64, rest_rad: f64, still_rad: f64) -> Vec<f64> {
+fn turning_points_rad(
+    before: &[Vec<f64>],
+    of: impl Fn(&[f64]) -> f64,
+    rest_rad: f64,
+    still_rad: f64,
+) -> Vec<f64> {
     let mut span = [rest_rad - still_rad, rest_rad + still_rad];
     // Newest first: the rest, then ever wider swings to alternating sides.
     let mut swings: Vec<(bool, f64)> = Vec::new();
@@ -77,15 +82,15 @@ mod tests {
     #[test]
     fn swings_that_a_wider_one_followed_are_forgotten() {
         let path = rows(&[0.0, 0.10, 0.05, 0.08, 0.02, 0.06]);
-        assert_eq!(memories(&path, &[0.04], 1e-6), vec![vec![0.0, 0.10, 0.02, 0.06, 0.04]]);
-        assert_eq!(memories(&[], &[0.04], 1e-6), vec![vec![0.04]]);
+        assert_eq!(path_memories(&path, &[0.04], 1e-6), vec![vec![0.0, 0.10, 0.02, 0.06, 0.04]]);
+        assert_eq!(path_memories(&[], &[0.04], 1e-6), vec![vec![0.04]]);
     }
 
     #[test]
     fn a_joint_arrives_from_where_it_was_last_far_away() {
         let path = rows(&[0.0, 0.1, 0.204, 0.202]);
-        assert_eq!(arrivals(&path, &[0.2], 1e-6), vec![Arrival::Positive]);
-        assert_eq!(arrivals(&rows(&[0.0, 0.1, 0.206]), &[0.2], 1e-6), vec![Arrival::Negative]);
-        assert_eq!(arrivals(&rows(&[0.2, 0.201]), &[0.2], 1e-6), vec![Arrival::Unknown]);
+        assert_eq!(arrival_directions(&path, &[0.2], 1e-6), vec![Arrival::Positive]);
+        assert_eq!(arrival_directions(&rows(&[0.0, 0.1, 0.206]), &[0.2], 1e-6), vec![Arrival::Negative]);
+        assert_eq!(arrival_directions(&rows(&[0.2, 0.201]), &[0.2], 1e-6), vec![Arrival::Unknown]);
     }
 }

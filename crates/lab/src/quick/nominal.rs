@@ -42,7 +42,9 @@ impl Nominal {
         });
         Nominal {
             dh_toml: Nominal::dh_toml(config),
-            world_from_base: about(&bases, |values| values.iter().sum::<f64>() / values.len() as f64),
+            world_from_base: coordinatewise_mean(&bases, |values| {
+                values.iter().sum::<f64>() / values.len() as f64
+            }),
             base_sigma_m: config.vicon.base_mount_sigma_mm * 1e-3,
             base_sigma_rad: config.vicon.base_mount_sigma_deg.to_radians(),
             link_from_tip: Pose::translation(0.0, 0.0, 0.0)
@@ -88,7 +90,7 @@ pub(super) fn mean_pose(trace: &Trace, body: Body) -> Pose {
             next_s += 1.0;
         }
     }
-    about(&even, |values| {
+    coordinatewise_mean(&even, |values| {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]) / 2.0
@@ -96,7 +98,7 @@ pub(super) fn mean_pose(trace: &Trace, body: Body) -> Pose {
 }
 
 /// A mean, coordinate by coordinate, rotations in the tangent space of the first.
-fn about(poses: &[Pose], mean: impl Fn(&[f64]) -> f64) -> Pose {
+fn coordinatewise_mean(poses: &[Pose], mean: impl Fn(&[f64]) -> f64) -> Pose {
     let Some(first) = poses.first() else { return Pose::identity() };
     let vector = |of: &dyn Fn(&Pose) -> Vector3<f64>| {
         Vector3::from_fn(|k, _| mean(&poses.iter().map(|pose| of(pose)[k]).collect::<Vec<_>>()))

@@ -2,7 +2,7 @@
 
 use crate::config::{EncoderConfig, LabConfig};
 use crate::random::{Purpose, Stream};
-use crate::sensors::outliers::{Swap, Tails, swapped_m, swaps};
+use crate::sensors::outliers::{Swap, Tails, draw_swaps, swapped_m};
 use armcal_core::{Pose, Reference};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -16,7 +16,7 @@ const FLOOR_RAD: f64 = 0.001 * std::f64::consts::PI / 180.0;
 pub const MOST_READINGS: f64 = 100.0;
 
 /// Mean of so many readings of each joint [rad], and its standard error [rad].
-pub(crate) fn encoders(
+pub(crate) fn mean_encoder_readings(
     joints: &EncoderConfig,
     joint_rad: &[f64],
     readings: f64,
@@ -46,7 +46,7 @@ pub struct Camera<'a> {
 impl<'a> Camera<'a> {
     pub fn new(config: &'a LabConfig, recording: usize, duration_s: f64) -> Camera<'a> {
         let draw = Stream::new(config.seed, Purpose::Quick, 2 * recording + 1);
-        Camera { swaps: swaps(config, recording, duration_s), ..Camera::drawn(config, recording, draw) }
+        Camera { swaps: draw_swaps(config, recording, duration_s), ..Camera::drawn(config, recording, draw) }
     }
 
     /// What sees a marker on a link; it is not swapped.

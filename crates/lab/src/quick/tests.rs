@@ -3,7 +3,7 @@
 use super::*;
 use crate::config::{Order, PassConfig};
 use crate::mechanisms::MechanismConfig;
-use crate::{nothing_hidden, run};
+use crate::{nothing_hidden, simulate_in_memory};
 use armcal_core::Arrival;
 
 const LABS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../pipelines/lab");
@@ -31,7 +31,7 @@ fn it_agrees_with_the_streams_dwell_by_dwell() {
         let mut config = lab(hidden);
         config.task.free.by_hand = by_hand;
         let quick = observe_from(&config, Path::new(LABS)).unwrap();
-        let (full, _) = run(&config, Path::new(LABS), &nothing_hidden).unwrap();
+        let (full, _) = simulate_in_memory(&config, Path::new(LABS), &nothing_hidden).unwrap();
         assert_eq!(kinds(&quick.truth), kinds(&full));
         assert_eq!(quick.observations.len(), full.recordings[0].dwells.len());
         let width = 0.6f64.to_radians();

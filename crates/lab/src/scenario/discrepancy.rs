@@ -13,8 +13,8 @@ use nalgebra::Vector3;
 
 /// Every one; the size is that at the dwells about its mean, per axis, over the declared noise there.
 pub(super) const FAMILIES: &[Family] = &[
-    family("nothing:smooth_3", &[], [3.0, 3.0], "times the declared noise", smooth),
-    family("nothing:smooth_10", &[], [10.0, 10.0], "times the declared noise", smooth),
+    family("nothing:smooth_3", &[], [3.0, 3.0], "times the declared noise", smooth_displacement),
+    family("nothing:smooth_10", &[], [10.0, 10.0], "times the declared noise", smooth_displacement),
 ];
 
 /// How far the arm has to turn for the displacement to be another one [rad].
@@ -23,7 +23,7 @@ const LENGTH_RAD: [f64; 2] = [0.5, 1.5];
 /// Enough waves that their sum is nearly normal, few enough to be added up at each step.
 const WAVES: usize = 64;
 
-fn smooth(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
+fn smooth_displacement(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
     let seen = observe(config)?.observations;
     let [low, high] = LENGTH_RAD;
     let length_rad = low * (high / low).powf(draw.draw.uniform([0.0, 1.0]));

@@ -1,7 +1,7 @@
 //! The families of the catalogue: what each hides, and what a right answer would be.
 
 use super::{Design, Hidden, Size};
-use crate::config::{LabConfig, value};
+use crate::config::{LabConfig, value_error};
 use crate::mechanisms::*;
 use crate::random::Stream;
 use crate::{LabError, observe};
@@ -133,7 +133,10 @@ impl Draw {
         let before_dwell = |dwell: usize| -> Result<f64, LabError> {
             let around = dwell.checked_sub(1).and_then(|from| times_ns.get(from..=dwell));
             let Some([before, after]) = around.and_then(|t| t.first_chunk()) else {
-                return Err(value("scenario.design", "has too few dwells for an event between two".into()));
+                return Err(value_error(
+                    "scenario.design",
+                    "has too few dwells for an event between two".into(),
+                ));
             };
             Ok((before + (after - before) / 2 - config.start_ns(recording)) as f64 * 1e-9)
         };
@@ -187,7 +190,7 @@ pub(super) fn stretched_nm(config: &LabConfig) -> [f64; 3] {
     [torque[0].abs(), torque[1].abs(), torque[2].abs()]
 }
 
-fn made(mechanism: MechanismConfig, effect: String, enters: [String; 2]) -> Made {
+fn known_effect(mechanism: MechanismConfig, effect: String, enters: [String; 2]) -> Made {
     Made { mechanism, effect: Some(effect), same: Vec::new(), alike: Vec::new(), enters }
 }
 
@@ -207,7 +210,7 @@ impl Made {
     }
 }
 
-fn angle(draw: &Draw) -> [String; 2] {
+fn driven_by_angle(draw: &Draw) -> [String; 2] {
     [draw.joint_channel(), format!("q{}", draw.joint)]
 }
 
@@ -245,14 +248,20 @@ pub(super) const FAMILIES: &[Family] = &[
     family("periodic", &[1, 2, 3], [0.05, 0.4], "deg", periodic),
     family("gear_ratio", &[1, 2, 3], [0.2, 2.0], "%", gear_ratio),
     family("belt_coupling", &[3], [0.3, 3.0], "%", belt_coupling),
-    family("zero_slip", &[1, 2, 3], [0.1, 1.0], "deg", |d, c| slip(d, c, Timing::Before)),
-    family("zero_slip@dwell", &[1, 2, 3], [0.1, 1.0], "deg", |d, c| slip(d, c, Timing::Within)),
-    family("zero_slip@dwells", &[1, 2, 3], [0.3, 2.0], "deg", |d, c| slip(d, c, Timing::Passing)),
-    family("tool_shift", &[], [0.3, 3.0], "mm", |d, c| bump(d, c, BumpedBody::Tool, Timing::Before)),
-    family("tool_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| bump(d, c, BumpedBody::Tool, Timing::Within)),
-    family("tool_shift@dwells", &[], [1.0, 5.0], "mm", |d, c| bump(d, c, BumpedBody::Tool, Timing::Passing)),
-    family("frame_shift", &[], [0.3, 3.0], "mm", |d, c| bump(d, c, BumpedBody::Base, Timing::Before)),
-    family("frame_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| bump(d, c, BumpedBody::Base, Timing::Within)),
+    family("zero_slip", &[1, 2, 3], [0.1, 1.0], "deg", |d, c| zero_slip(d, c, Timing::Before)),
+    family("zero_slip@dwell", &[1, 2, 3], [0.1, 1.0], "deg", |d, c| zero_slip(d, c, Timing::Within)),
+    family("zero_slip@dwells", &[1, 2, 3], [0.3, 2.0], "deg", |d, c| zero_slip(d, c, Timing::Passing)),
+    family("tool_shift", &[], [0.3, 3.0], "mm", |d, c| body_shift(d, c, BumpedBody::Tool, Timing::Before)),
+    family("tool_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| {
+        body_shift(d, c, BumpedBody::Tool, Timing::Within)
+    }),
+    family("tool_shift@dwells", &[], [1.0, 5.0], "mm", |d, c| {
+        body_shift(d, c, BumpedBody::Tool, Timing::Passing)
+    }),
+    family("frame_shift", &[], [0.3, 3.0], "mm", |d, c| body_shift(d, c, BumpedBody::Base, Timing::Before)),
+    family("frame_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| {
+        body_shift(d, c, BumpedBody::Base, Timing::Within)
+    }),
     family("unsettled_reading", &[1, 2, 3], [0.01, 0.06], "of a move", unsettled_reading),
     family("zero_drift", &[1, 2, 3], [0.1, 0.8], "deg/session", zero_drift),
     family("frame_drift", &[], [0.2, 2.0], "mm/session", frame_drift),

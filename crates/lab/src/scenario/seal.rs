@@ -1,9 +1,11 @@
 //! A scenario on disk: everything the product may see in one folder, the truth elsewhere.
 
 use super::Scenario;
-use crate::config::{LabConfig, value};
+use crate::config::{LabConfig, value_error};
 use crate::truth::write_json;
-use crate::{LabError, Nominal, board, make_folder, may_write, nothing_hidden, run, write_recordings};
+use crate::{
+    LabError, Nominal, board, make_folder, may_write, nothing_hidden, simulate_in_memory, write_recordings,
+};
 use armcal_recording::may_write_all;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -25,21 +27,21 @@ pub fn seal(scenario: &Scenario, folder: &Path, truth: &Path) -> Result<Sealed, 
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     if whole(truth).starts_with(whole(folder)) {
         let why = "must lie outside of the folder of the recordings, or it would not be sealed".into();
-        return Err(value("truth", why));
+        return Err(value_error("truth", why));
     }
     let planted = scenario.plant()?;
     let config = &planted.config;
     let [arm, drawing, pipeline] = ["arm.toml", "board.toml", "pipeline.toml"].map(|name| folder.join(name));
     may_write(config.recordings.iter().map(|r| r.name.as_str()), folder, truth)?;
     may_write_all([&arm, &drawing, &pipeline])?;
-    let (mut facts, logs) = run(config, Path::new(""), &nothing_hidden)?;
+    let (mut facts, logs) = simulate_in_memory(config, Path::new(""), &nothing_hidden)?;
     facts.scenario = Some(scenario.clone());
     facts.hidden = planted.hidden;
 
     let recordings = write_recordings(&facts, &logs, folder)?;
-    write(&arm, "arm", &Nominal::dh_toml(config))?;
-    write(&drawing, "board", &board::drawing(&config.board.file)?)?;
-    write(&pipeline, "pipeline", &pipeline_toml(config))?;
+    write_with_header(&arm, "arm", &Nominal::dh_toml(config))?;
+    write_with_header(&drawing, "board", &board::read_drawing(&config.board.file)?)?;
+    write_with_header(&pipeline, "pipeline", &pipeline_toml(config))?;
     if let Some(parent) = truth.parent() {
         make_folder(parent)?;
     }
@@ -48,7 +50,7 @@ pub fn seal(scenario: &Scenario, folder: &Path, truth: &Path) -> Result<Sealed, 
 }
 
 /// Writes a text that says in its first line by whom it was made.
-fn write(path: &Path, kind: &str, text: &str) -> Result<(), LabError> {
+fn write_with_header(path: &Path, kind: &str, text: &str) -> Result<(), LabError> {
     let text = format!("# armcal.simulated-{kind}/1\n{text}");
     armcal_recording::atomic::write(path, text.as_bytes())
         .map_err(|source| LabError::Recording { path: path.to_owned(), source: Box::new(source) })

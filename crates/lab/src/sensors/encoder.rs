@@ -2,7 +2,7 @@
 
 use super::message::{Kind, Message, Payload};
 use super::transport::Transport;
-use super::{Log, evenly};
+use super::{Log, log_evenly};
 use crate::config::{EncoderConfig, JointFormat, LabConfig};
 use crate::random::{Purpose, Stream};
 use crate::session::Session;
@@ -13,7 +13,7 @@ pub fn joint_states(config: &LabConfig, recording: usize, session: &Session, log
     let joints = &config.joints;
     let channel = log.channel(&joints.topic, Kind::JointState, "", &joints.names);
     let mut noise = Stream::new(config.seed, Purpose::Encoder, recording);
-    let mut transport = transport(config, recording, 0);
+    let mut transport = joint_transport(config, recording, 0);
     let mut before: Option<(f64, Vec<f64>)> = None;
     for sequence in 0..=(session.trace.duration_s() * joints.rate_hz).floor() as u32 {
         let nominal_s = f64::from(sequence) / joints.rate_hz;
@@ -28,7 +28,7 @@ pub fn joint_states(config: &LabConfig, recording: usize, session: &Session, log
             }
             _ => vec![0.0; counts.len()],
         };
-        let payload = payload(joints, &counts, &speed);
+        let payload = joint_payload(joints, &counts, &speed);
         let stamp_ns = config.start_ns(recording) + (time_s * 1e9).round() as i64;
         let log_ns = transport.log_ns(stamp_ns);
         log.messages.push(Message { channel, sequence, stamp_ns, log_ns, payload });
@@ -41,23 +41,23 @@ pub fn set_points(config: &LabConfig, recording: usize, session: &Session, log: 
     let joints = &config.joints;
     let Some(topic) = &joints.set_point_topic else { return };
     let channel = log.channel(topic, Kind::JointState, "", &joints.names);
-    let transport = transport(config, recording, 1);
-    evenly(config, (recording, session), (channel, joints.rate_hz, transport), log, |time_s| {
+    let transport = joint_transport(config, recording, 1);
+    log_evenly(config, (recording, session), (channel, joints.rate_hz, transport), log, |time_s| {
         // Set-points step: the one in force is the one of the step before, not a mean of two.
-        let (step, ..) = crate::trace::around(time_s, session.trace.len());
+        let (step, ..) = crate::trace::bracketing_steps(time_s, session.trace.len());
         let set = &session.trace.set_point_rad[step];
         let counts: Vec<f64> = set.iter().map(|angle| (angle / joints.count_rad()).round()).collect();
-        payload(joints, &counts, &[])
+        joint_payload(joints, &counts, &[])
     });
 }
 
-fn transport(config: &LabConfig, recording: usize, channel: usize) -> Transport<'_> {
+fn joint_transport(config: &LabConfig, recording: usize, channel: usize) -> Transport<'_> {
     let draw = Stream::new(config.seed, Purpose::JointTransport, 2 * recording + channel);
     Transport::new(&config.joints.transport, draw)
 }
 
 /// A joint state of these counts, in the form that is published.
-pub(crate) fn payload(joints: &EncoderConfig, counts: &[f64], counts_per_s: &[f64]) -> Payload {
+pub(crate) fn joint_payload(joints: &EncoderConfig, counts: &[f64], counts_per_s: &[f64]) -> Payload {
     let (position, velocity): (Vec<f64>, Vec<f64>) = match joints.format {
         JointFormat::Rad => {
             let rad = |counts: &[f64]| counts.iter().map(|c| c * joints.count_rad()).collect();
@@ -86,14 +86,15 @@ mod tests {
             zero_counts: vec![0, 2048, -5],
             ..EncoderConfig::default()
         };
-        let Payload::Joints { position, velocity } = payload(&raw, &[10.0, 10.0, 10.0], &[1.0, 1.0, 1.0])
+        let Payload::Joints { position, velocity } =
+            joint_payload(&raw, &[10.0, 10.0, 10.0], &[1.0, 1.0, 1.0])
         else {
             panic!("not joints")
         };
         assert_eq!(position, [10.0, 2038.0, 5.0]);
         assert_eq!(velocity, [1.0, -1.0, 1.0]);
         let rad = EncoderConfig { format: JointFormat::Rad, velocity: false, ..raw };
-        let Payload::Joints { position, velocity } = payload(&rad, &[1024.0; 3], &[1.0; 3]) else {
+        let Payload::Joints { position, velocity } = joint_payload(&rad, &[1024.0; 3], &[1.0; 3]) else {
             panic!("not joints")
         };
         assert!(position.iter().all(|q| (q - std::f64::consts::FRAC_PI_2).abs() < 1e-15));

@@ -2,7 +2,7 @@
 
 use super::message::{Kind, Payload};
 use super::transport::Transport;
-use super::{Log, evenly};
+use super::{Log, log_evenly};
 use crate::config::{GaugeKind, LabConfig};
 use crate::random::{Purpose, Stream};
 use crate::session::Session;
@@ -48,7 +48,7 @@ impl Standing {
 }
 
 /// Adds the readings of every instrument to the log.
-pub fn readings(config: &LabConfig, recording: usize, session: &Session, log: &mut Log) {
+pub fn log_readings(config: &LabConfig, recording: usize, session: &Session, log: &mut Log) {
     for index in 0..config.gauges.len() {
         of_one(config, [recording, index], session, log);
     }
@@ -63,7 +63,7 @@ fn of_one(config: &LabConfig, [recording, index]: [usize; 2], session: &Session,
     let mut noise = Stream::new(config.seed, Purpose::Gauge, stream);
     let draw = Stream::new(config.seed, Purpose::Gauge, stream + 1);
     let transport = Transport::new(&config.joints.transport, draw);
-    evenly(config, (recording, session), (channel, gauge.rate_hz, transport), log, |time_s| {
+    log_evenly(config, (recording, session), (channel, gauge.rate_hz, transport), log, |time_s| {
         let base = pose_at(&session.trace.world_from_base, time_s);
         let tip = pose_at(&session.trace.world_from_tip, time_s);
         let read_mm = standing.length_m(gauge.kind, &base, &tip) * 1e3 + noise.normal() * gauge.noise_mm;

@@ -52,7 +52,7 @@ impl Log {
 }
 
 /// Adds messages that come evenly, so many a second, stamped by the robot's clock; `payload` is told when [s].
-fn evenly(
+fn log_evenly(
     config: &LabConfig,
     (recording, session): (usize, &Session),
     (channel, rate_hz, mut transport): (usize, f64, Transport),
@@ -69,18 +69,18 @@ fn evenly(
 }
 
 /// Records a session.
-pub fn observe(config: &LabConfig, recording: usize, session: &Session) -> Log {
+pub fn record_session(config: &LabConfig, recording: usize, session: &Session) -> Log {
     let clock = SensorClock::draw(config, recording);
     let mut log = Log::new(clock);
     encoder::joint_states(config, recording, session, &mut log);
     let markers = (0..config.vicon.markers.len()).map(Body::Marker);
     for body in [Body::Tip, Body::Table, Body::Base].into_iter().chain(markers) {
-        vicon::subject(config, recording, session, body, &mut log);
+        vicon::log_subject(config, recording, session, body, &mut log);
     }
     if config.temperature.published {
-        temperature::readings(config, recording, session, &mut log);
+        temperature::log_readings(config, recording, session, &mut log);
     }
-    gauge::readings(config, recording, session, &mut log);
+    gauge::log_readings(config, recording, session, &mut log);
     encoder::set_points(config, recording, session, &mut log);
     log.in_order()
 }

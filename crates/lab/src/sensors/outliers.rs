@@ -47,7 +47,7 @@ pub struct Swap {
 }
 
 /// The swaps of one recording.
-pub fn swaps(config: &LabConfig, recording: usize, duration_s: f64) -> Vec<Swap> {
+pub fn draw_swaps(config: &LabConfig, recording: usize, duration_s: f64) -> Vec<Swap> {
     let (vicon, mut swaps, mut time_s) = (&config.vicon, Vec::new(), 0.0);
     let mut draw = Stream::new(config.seed, Purpose::Swaps, recording);
     if vicon.swaps_per_minute == 0.0 {

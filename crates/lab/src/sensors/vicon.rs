@@ -2,7 +2,7 @@
 
 use super::Log;
 use super::message::{Kind, Message, Payload};
-use super::outliers::{Tails, swapped_m, swaps};
+use super::outliers::{Tails, draw_swaps, swapped_m};
 use super::transport::Transport;
 use crate::config::{BodyConfig, LabConfig, PoseMessage, ViconConfig};
 use crate::mechanism::Body;
@@ -39,7 +39,7 @@ pub enum OcclusionKind {
 }
 
 /// Adds the frames of one subject to the log.
-pub fn subject(config: &LabConfig, recording: usize, session: &Session, body: Body, log: &mut Log) {
+pub fn log_subject(config: &LabConfig, recording: usize, session: &Session, body: Body, log: &mut Log) {
     let vicon = &config.vicon;
     let (settings, purposes) = match body {
         Body::Tip => (vicon.tip.clone(), [Purpose::ViconTip, Purpose::OcclusionTip, Purpose::TransportTip]),
@@ -72,8 +72,11 @@ pub fn subject(config: &LabConfig, recording: usize, session: &Session, body: Bo
     let mut occlusions = draw_occlusions(settings, session.trace.duration_s(), start_ns, occlusion);
     let mut transport = Transport::new(&vicon.clock.transport, transport);
     let mut tails = Tails::new(vicon, config.seed, recording);
-    let swaps =
-        if body == Body::Tip { swaps(config, recording, session.trace.duration_s()) } else { Vec::new() };
+    let swaps = if body == Body::Tip {
+        draw_swaps(config, recording, session.trace.duration_s())
+    } else {
+        Vec::new()
+    };
     // The cameras keep time by their own clock.
     let period_s = clock.robot_per_sensor() / settings.rate_hz;
     let mut last = Payload::Pose { position_m: Vector3::zeros(), orientation: Quaternion::identity() };

@@ -46,7 +46,7 @@ pub(super) const KIND: EffectKind = EffectKind {
         "gear_ratio",
         "belt_coupling",
     ],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
@@ -59,7 +59,7 @@ struct ArmCompliance {
     joints: Vec<usize>,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let turning = |joint: &usize| context.motion(*joint) == Motion::Revolute;
     let joints: Vec<usize> = context.zero.joints_of(context.arm()?).filter(turning).collect();
     if joints.len() < 2 {

@@ -28,7 +28,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     summary: "an axis is not parallel to the one before it",
     family: Family::Geometry,
     confused_with: &["eccentricity", "second_harmonic", "gear_ratio", "belt_coupling"],
-    place,
+    place: effect_placement,
     ..EffectKind::PLAIN
 };
 
@@ -37,7 +37,7 @@ struct AxisTilt {
     slot: Slot,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     context
         .parallel_to_previous(joint)

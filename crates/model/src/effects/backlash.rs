@@ -33,7 +33,7 @@
 //! Slamani, Nubiola, Bonev 2012 (Industrial Robot 39:4); play operator: Visintin, Differential Models of
 //! Hysteresis, 1994, ch. III.
 
-use super::play::{BEGUN_DEG, lagging};
+use super::play::{BEGUN_DEG, led_play_displacement};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -43,7 +43,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     shapes: &[LED, REST],
     confused_with: &["friction_windup", "gravity_backlash", "crossed_backlash", "belt_backlash"],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
@@ -55,7 +55,7 @@ struct Backlash {
     begun: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     let (typical, bound) = (context.joint_size(joint, 0.5), context.joint_size(joint, 8.0));
     let width = amplitude("width", context.joint_unit(joint), typical, bound, "width of the gap");
@@ -66,7 +66,7 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
 impl Physics for Backlash {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let memory = x.path_memory_rad(self.joint);
-        change.joint(self.joint, lagging(theta[0], self.begun, memory, x.arrival[self.joint]));
+        change.joint(self.joint, led_play_displacement(theta[0], self.begun, memory, x.arrival[self.joint]));
     }
 
     fn gap(&self, theta: &[f64]) -> Option<(usize, f64)> {

@@ -23,7 +23,7 @@
 //! # Source
 //! Notes of the project; ISO 9283 asks for a rigid mounting.
 
-use super::frame_shift::about;
+use super::frame_shift::pivot_translation_m;
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -40,14 +40,14 @@ pub(super) const KIND: EffectKind = EffectKind {
             upper: 5.0,
             meaning: "height of the pivot above the origin of the base",
             parameter: true,
-            values: Some(heights),
+            values: Some(pivot_heights_m),
         },
         SEATED,
         ARM,
     ],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "belt_compliance", "link_bending", "hardening_compliance"],
-    place,
+    place: effect_placement,
     told_by: "put a marker on the robot's base: it moves only if the base gives way",
     ..EffectKind::PLAIN
 };
@@ -61,7 +61,7 @@ struct BaseCompliance {
     shares: TorqueTerms,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let arm = context.arm()?;
     let joints = context.zero.joints_of(arm);
     let shares = TorqueTerms::of(context, joints.start + OUTER.min(joints.len()) - 1);
@@ -74,7 +74,7 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
 }
 
 /// Between the foot and the axis of the second joint.
-fn heights(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn pivot_heights_m(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     let Ok(arm) = context.arm() else { return Vec::new() };
     let Some(second) = context.zero.joints_of(arm).nth(1) else { return Vec::new() };
     let (second, base) = (&context.zero.joints[second], &context.zero.bases[arm]);
@@ -97,6 +97,6 @@ impl Physics for BaseCompliance {
             self.shares.sum(theta, axis.dot(&links), axis.dot(&outer), axis.dot(&load))
         });
         let pivot_m = Vector3::new(D::from(0.0), D::from(0.0), theta[self.shares.count()]);
-        change.twist(Slot::Behind(self.arm), about(&pivot_m, turn), turn);
+        change.twist(Slot::Behind(self.arm), pivot_translation_m(&pivot_m, turn), turn);
     }
 }

@@ -23,7 +23,7 @@
 //! Tilting stiffness of bearings: Harris and Kotzalas, Rolling Bearing Analysis; configuration-dependent joint tilting:
 //! Patel, thesis, Univ. Adelaide 2017.
 
-use super::frame_shift::about;
+use super::frame_shift::pivot_translation_m;
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -32,7 +32,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     never_negative: &["tilt", "tilt_load"],
     confused_with: &["compliance", "base_compliance", "arm_compliance", "link_bending"],
-    place,
+    place: effect_placement,
     of_a_make: true,
     ..EffectKind::PLAIN
 };
@@ -43,7 +43,7 @@ struct BearingCompliance {
     shares: TorqueTerms,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     if joint == 0 {
         return Err("the bearing of the first joint is base_compliance at its height; use that".to_owned());
@@ -74,6 +74,6 @@ impl Physics for BearingCompliance {
             self.shares.sum(theta, axis.dot(&links), axis.dot(&outer), axis.dot(&load))
         });
         let pivot_m = slot.rotation.tr_mul(&(joint.origin_m - slot.translation_m));
-        change.twist(Slot::Before(joint.segment), about(&pivot_m.map(D::from), turn), turn);
+        change.twist(Slot::Before(joint.segment), pivot_translation_m(&pivot_m.map(D::from), turn), turn);
     }
 }

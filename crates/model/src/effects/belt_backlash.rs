@@ -24,7 +24,7 @@
 //! # Source
 //! Play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III; layout of the paper's arm.
 
-use super::play::{BEGUN_DEG, lagging};
+use super::play::{BEGUN_DEG, led_play_displacement};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -34,7 +34,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     shapes: &[LED],
     confused_with: &["backlash", "crossed_backlash", "friction_windup"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
@@ -45,7 +45,7 @@ struct BeltBacklash {
     sense: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     let sense = context
         .parallel_to_previous(joint)
@@ -60,6 +60,6 @@ impl Physics for BeltBacklash {
         let sum = self.sense * x.arrival[self.joint - 1] + x.arrival[self.joint];
         let direction = if sum == 0.0 { 0.0 } else { sum.signum() };
         let memory = x.pair_memory_rad(self.joint, self.sense);
-        change.joint(self.joint, lagging(theta[0], BEGUN_DEG.to_radians(), memory, direction));
+        change.joint(self.joint, led_play_displacement(theta[0], BEGUN_DEG.to_radians(), memory, direction));
     }
 }

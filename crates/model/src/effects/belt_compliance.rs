@@ -32,7 +32,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[SEATED],
     never_negative: &["compliance", "compliance_load"],
     confused_with: &["compliance", "link_bending", "base_compliance", "hardening_compliance"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
@@ -46,7 +46,7 @@ struct BeltCompliance {
     load: bool,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     let sense = context
         .parallel_to_previous(joint)

@@ -27,7 +27,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     summary: "a joint moves along with the one before it",
     family: Family::Transmission,
     confused_with: &["gear_ratio", "compliance", "eccentricity", "second_harmonic"],
-    place,
+    place: effect_placement,
     ..EffectKind::PLAIN
 };
 
@@ -36,7 +36,7 @@ struct BeltCoupling {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     let previous = joint.checked_sub(1).filter(|_| !context.zero.is_first(joint));
     let previous = previous.ok_or("there is no joint before the first")?;

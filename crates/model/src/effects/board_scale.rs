@@ -26,7 +26,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     family: Family::Board,
     target: Target::Whole,
     confused_with: &["sensor_scale"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Lengths],
     ..EffectKind::PLAIN
 };
@@ -34,7 +34,7 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct BoardScale;
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     if context.session.cavities.is_empty() {
         return Err("no observation is seated in the board".to_owned());
     }

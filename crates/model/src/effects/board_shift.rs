@@ -22,7 +22,7 @@
 //! # Source
 //! Rigid motion (eq. 7-10 of Li et al. 2016, for the board); notes of the project.
 
-use super::frame_shift::{about, rigid_motion};
+use super::frame_shift::{pivot_translation_m, rigid_motion};
 use super::prelude::*;
 use super::spec::Since;
 use std::collections::BTreeMap;
@@ -35,7 +35,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     confused_with: &["frame_shift", "tool_shift"],
-    place,
+    place: effect_placement,
     look_at: "The board slipped on its stand or under its markers: look at its clamps, and measure it again before and after.",
     ..EffectKind::PLAIN
 };
@@ -45,7 +45,7 @@ struct BoardShift {
     middles_m: BTreeMap<usize, Vector3<f64>>,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.event()?;
     if !context.session.seated_and_tracked() {
         return Err(
@@ -67,7 +67,7 @@ impl Physics for BoardShift {
         let recording = x.observation.dwell.recording;
         let middle_m = self.middles_m.get(&recording).copied().unwrap_or_else(Vector3::zeros);
         let arm_m = (in_board_m - middle_m).map(D::from);
-        let back_m = about(&arm_m, [theta[3], theta[4], theta[5]]);
+        let back_m = pivot_translation_m(&arm_m, [theta[3], theta[4], theta[5]]);
         for axis in 0..3 {
             change.seat_m[axis] += theta[axis] - back_m[axis];
         }

@@ -24,14 +24,14 @@ pub(super) const KIND: EffectKind = EffectKind {
     summary: "clocks of robot and sensor differ: an error in proportion to speed",
     family: Family::Timing,
     target: Target::Whole,
-    place,
+    place: effect_placement,
     ..EffectKind::PLAIN
 };
 
 #[derive(Debug)]
 struct ClockOffset;
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     if !context.session.moving {
         return Err("clocks do not matter in dwells; it needs observations of the moving arm".to_owned());
     }

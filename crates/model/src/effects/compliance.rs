@@ -45,7 +45,7 @@ pub(super) const KIND: EffectKind = EffectKind {
         "gear_ratio",
         "belt_coupling",
     ],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
@@ -56,7 +56,7 @@ struct Compliance {
     shares: TorqueTerms,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     context.loaded(joint)?;
     let shares = TorqueTerms::of(context, joint);

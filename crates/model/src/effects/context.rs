@@ -6,7 +6,7 @@ use super::nominal_pose::NominalPose;
 use super::session::Session;
 use super::spec::EffectSpec;
 use crate::Model;
-use crate::error::hint;
+use crate::error::similar_name_hint;
 use crate::segment::Motion;
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::Vector3;
@@ -89,7 +89,7 @@ impl EffectContext<'_> {
             ));
         };
         known.iter().find(|(name, _)| name == wanted).copied().ok_or_else(|| {
-            let hint = hint(wanted, names());
+            let hint = similar_name_hint(wanted, names());
             format!("there is no marker \"{wanted}\"{hint} The markers are {all}")
         })
     }

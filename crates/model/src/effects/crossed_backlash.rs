@@ -24,7 +24,7 @@
 //! # Source
 //! Dahl's friction with a sharp slip is the play operator: Visintin, Differential Models of Hysteresis, 1994, ch. III.
 
-use super::play::{BEGUN_DEG, following};
+use super::play::{BEGUN_DEG, play_displacement};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -41,12 +41,12 @@ pub(super) const KIND: EffectKind = EffectKind {
             upper: 64.0,
             meaning: "number of the joint whose direction of arrival counts",
             parameter: false,
-            values: Some(others),
+            values: Some(other_joints),
         },
         LED,
     ],
     confused_with: &["backlash", "belt_backlash"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
@@ -63,7 +63,7 @@ struct CrossedBacklash {
     per_unit: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     let number = context.shape("from").unwrap_or_default();
     let from = (0..context.zero.joints.len())
@@ -82,7 +82,7 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
     Ok(Placement::new(vec![width], CrossedBacklash { joint, from, begun, per_unit }))
 }
 
-fn others(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn other_joints(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     let own = context.spec.target.unwrap_or_default();
     let joints = context.model.chain().joints_beside(own);
     let near = |k: &usize| *k != own && (joints.len() <= FEW_JOINTS || k.abs_diff(own) == 1);
@@ -92,7 +92,8 @@ fn others(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64
 impl Physics for CrossedBacklash {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let width = theta[0] * self.per_unit.recip();
-        let dragged = following(width, self.begun, x.path_memory_rad(self.from), x.arrival[self.from]);
+        let dragged =
+            play_displacement(width, self.begun, x.path_memory_rad(self.from), x.arrival[self.from]);
         change.joint(self.joint, dragged * self.per_unit);
     }
 }

@@ -6,7 +6,7 @@
 use super::kind::EffectKind;
 use super::table::Override;
 use super::{EffectSpec, NominalPose, Session, find, placed};
-use crate::error::hint;
+use crate::error::similar_name_hint;
 use crate::{Model, ModelError};
 use armcal_core::Parameter;
 use std::collections::BTreeSet;
@@ -71,7 +71,7 @@ impl Model {
         for declared in self.declared.iter() {
             let known = self.quantities(&declared.wide, session, &zero)?;
             if !known.is_empty() && !known.iter().any(|quantity| declared.quantity.matches(quantity)) {
-                let hint = hint(declared.quantity.as_str(), known.iter().map(String::as_str));
+                let hint = similar_name_hint(declared.quantity.as_str(), known.iter().map(String::as_str));
                 let all = known.into_iter().collect::<Vec<_>>().join(", ");
                 let problem = format!("it has no parameter \"{}\"{hint} It has: {all}", declared.quantity);
                 return Err(ModelError::BadEffect { effect: declared.name.clone(), problem });
@@ -91,7 +91,7 @@ impl Model {
         let mut known = BTreeSet::new();
         for spec in self.targets(kind, wide.clone()).filter(|spec| wide.covers(spec)) {
             let spec = with_every_shape(kind, spec);
-            let Ok((_, own)) = placed::place(self, session, &spec, zero, 0) else { continue };
+            let Ok((_, own)) = placed::place_effect(self, session, &spec, zero, 0) else { continue };
             let prefix = format!("{spec}.");
             known.extend(own.iter().filter_map(|p| p.name.strip_prefix(&prefix).map(str::to_owned)));
         }

@@ -26,7 +26,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     summary: "a gear or encoder disc off its centre: an error once a turn",
     family: Family::Transmission,
     confused_with: &["second_harmonic", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
@@ -39,7 +39,7 @@ pub(super) struct Harmonic {
     pub harmonic: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     Ok(Placement::new(amplitudes_wave(0.4, 8.0, " q"), Harmonic { joint, harmonic: 1.0 }))
 }

@@ -27,7 +27,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     family: Family::Elasticity,
     toggle: Toggle::Load,
     confused_with: &["compliance", "hardening_compliance"],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
@@ -38,7 +38,7 @@ struct EffortCompliance {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     if context.largest_effort_nm(joint)? <= 0.0 {
         return Err(format!("the measured effort of `{}` is zero throughout", context.joint_name(joint)));

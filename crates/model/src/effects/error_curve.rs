@@ -55,7 +55,7 @@ pub(super) const KIND: EffectKind = EffectKind {
         },
     ],
     confused_with: &["eccentricity", "second_harmonic", "periodic", "gear_ratio"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
 };
@@ -70,7 +70,7 @@ struct ErrorCurve {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     let asked = context.shape("harmonics").unwrap_or(16.0);
     let harmonics = asked as usize;
@@ -98,19 +98,19 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
 impl Physics for ErrorCurve {
     fn deform<D: Scalar>(&self, theta: &[D], x: &Drivers<'_>, change: &mut Deformation<D>) {
         let mut sum = D::from(0.0);
-        for (amplitude, wave) in theta.iter().zip(waves(x.joint_rad(self.joint), theta.len())) {
+        for (amplitude, wave) in theta.iter().zip(fourier_terms(x.joint_rad(self.joint), theta.len())) {
             sum += *amplitude * wave;
         }
         change.joint(self.joint, sum);
     }
 
     fn per_amplitude(&self, x: &Drivers<'_>, count: usize) -> Option<(usize, Vec<f64>)> {
-        Some((self.joint, waves(x.joint_rad(self.joint), count).collect()))
+        Some((self.joint, fourier_terms(x.joint_rad(self.joint), count).collect()))
     }
 }
 
 /// `sin q, cos q, sin 2q, cos 2q ..`, the first `count`: each harmonic turned on from the one before.
-fn waves(angle_rad: f64, count: usize) -> impl Iterator<Item = f64> {
+fn fourier_terms(angle_rad: f64, count: usize) -> impl Iterator<Item = f64> {
     let first = angle_rad.sin_cos();
     let next = move |(sine, cosine): &(f64, f64)| {
         Some((sine * first.1 + cosine * first.0, cosine * first.1 - sine * first.0))

@@ -24,11 +24,11 @@
 //! The user.
 
 use super::formula::{Formula, Number};
-use super::measure::{Dimension, Measure, dimension, symbol};
+use super::measure::{Dimension, Measure, dimension, dimension_symbol};
 use super::prelude::*;
 use super::spec::joint_index;
 use super::table::unit_of;
-use crate::error::hint;
+use crate::error::similar_name_hint;
 use crate::segment::Motion;
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     family: Family::User,
     target: Target::Whole,
     offered: Offered::Never,
-    place,
+    place: effect_placement,
     ..EffectKind::PLAIN
 };
 
@@ -89,7 +89,7 @@ struct UserEffect {
     acts: Acts,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let expression = context
         .spec
         .expression
@@ -120,7 +120,7 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
     let variables = formula
         .variables()
         .iter()
-        .map(|name| variable(name, &names, context))
+        .map(|name| resolve_variable(name, &names, context))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(unused) = (0..names.len()).find(|k| !variables.contains(&Variable::Parameter(*k))) {
         return Err(format!("the formula \"{}\" has no \"{}\"", expression.formula, names[unused]));
@@ -142,8 +142,8 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
             return wrong(format!(
                 "{} takes {}, it gives {}",
                 expression.acts_on,
-                symbol(&expected),
-                symbol(&found)
+                dimension_symbol(&expected),
+                dimension_symbol(&found)
             ));
         }
         Measure::Known(_) | Measure::Literal(_) | Measure::Anything => {}
@@ -158,11 +158,15 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
 
 fn unknown_unit(name: &str, unit: &str) -> String {
     let known: Vec<&str> = Unit::ALL.iter().map(|unit| unit.symbol()).collect();
-    let hint = hint(unit, known.iter().copied());
+    let hint = similar_name_hint(unit, known.iter().copied());
     format!("parameter \"{name}\": there is no unit \"{unit}\"{hint} The units are {}", known.join(", "))
 }
 
-fn variable(name: &str, parameters: &[&str], context: &EffectContext<'_>) -> Result<Variable, String> {
+fn resolve_variable(
+    name: &str,
+    parameters: &[&str],
+    context: &EffectContext<'_>,
+) -> Result<Variable, String> {
     if let Some(k) = parameters.iter().position(|parameter| *parameter == name) {
         return Ok(Variable::Parameter(k));
     }
@@ -201,7 +205,7 @@ fn variable(name: &str, parameters: &[&str], context: &EffectContext<'_>) -> Res
         .map(str::to_owned)
         .chain(of_joints)
         .collect();
-    let hint = hint(name, known.iter().map(String::as_str));
+    let hint = similar_name_hint(name, known.iter().map(String::as_str));
     Err(format!(
         "the formula has a variable \"{name}\" that is neither a parameter nor one of q1.. s1.. tau1.. effort1.. (to \
          {joints}), temperature, t, load{hint}"
@@ -227,7 +231,7 @@ fn acts_on(text: &str, context: &EffectContext<'_>) -> Result<Acts, String> {
     let on_path = (0..model.parameters().len()).filter(|index| model.is_on_path(*index));
     let names: Vec<&str> = on_path.map(|index| model.parameters()[index].name.as_str()).collect();
     let all = names.iter().copied().chain(joint_names.iter().map(String::as_str)).chain([LENGTHS]);
-    let hint = hint(text, all);
+    let hint = similar_name_hint(text, all);
     Err(format!(
         "acts_on = \"{text}\" is no joint, no parameter of chain, base or tip, and none of lengths, world.x, world.y, \
          world.z{hint}"

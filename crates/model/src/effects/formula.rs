@@ -1,7 +1,7 @@
 //! Formulas as text: read by exmex, evaluated over dual numbers and over units by the same list of operators.
 
 use super::measure::Measure;
-use crate::error::hint;
+use crate::error::similar_name_hint;
 use exmex::{BinOp, Express, FlatEx, MakeOperators, MatchLiteral, Operator};
 use num_dual::{Dual64, DualNum};
 use std::marker::PhantomData;
@@ -157,7 +157,7 @@ fn check_characters(text: &str) -> Result<(), String> {
 }
 
 /// Names in a formula with where they end.
-fn words(text: &str) -> impl Iterator<Item = (&str, &str)> {
+fn split_words(text: &str) -> impl Iterator<Item = (&str, &str)> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_' || c == '.';
     let mut rest = text;
     std::iter::from_fn(move || {
@@ -172,8 +172,8 @@ fn words(text: &str) -> impl Iterator<Item = (&str, &str)> {
 fn check_functions(text: &str) -> Result<(), String> {
     let called =
         |(word, after): &(&str, &str)| after.trim_start().starts_with('(') && !FUNCTIONS.contains(word);
-    let Some((word, _)) = words(text).find(called) else { return Ok(()) };
-    let hint = hint(word, FUNCTIONS.into_iter());
+    let Some((word, _)) = split_words(text).find(called) else { return Ok(()) };
+    let hint = similar_name_hint(word, FUNCTIONS.into_iter());
     let known = FUNCTIONS.join(", ");
     Err(format!(
         "the formula \"{text}\" calls \"{word}\", which is no function{hint} The functions are {known}"
@@ -185,7 +185,7 @@ fn check_minus(text: &str) -> Result<(), String> {
     for (at, _) in text.match_indices('-') {
         let before = text[..at].trim_end().chars().last();
         let leading = before.is_none_or(|c| "(+-*/^".contains(c));
-        let powered = words(&text[at..]).next().is_some_and(|(word, after)| {
+        let powered = split_words(&text[at..]).next().is_some_and(|(word, after)| {
             text[at + 1..].trim_start().starts_with(word) && after.trim_start().starts_with('^')
         });
         if leading && powered {

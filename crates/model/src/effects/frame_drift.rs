@@ -27,7 +27,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Time,
     target: Target::Whole,
     confused_with: &["zero_drift", "thermal_growth", "warm_up", "frame_shift"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
@@ -35,7 +35,7 @@ pub(super) const KIND: EffectKind = EffectKind {
 #[derive(Debug)]
 struct FrameDrift;
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.lasting()?;
     let amplitudes = amplitudes_xyz("", Unit::Metre, 0.8e-3, 0.03, "drift over the whole session along");
     Ok(Placement::twisting(Slot::WORLD, amplitudes, FrameDrift))

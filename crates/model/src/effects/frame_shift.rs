@@ -33,7 +33,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     confused_with: &["zero_slip", "tool_shift", "board_shift", "frame_drift"],
-    place,
+    place: effect_placement,
     look_at: "The robot's foot, the table or the cameras moved, or a tilt is not what was declared: look at their clamps and marker plates.",
     lookalikes: &[Lookalikes::Moments],
     ..EffectKind::PLAIN
@@ -44,7 +44,7 @@ struct FrameShift {
     centre_m: Vector3<f64>,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.event()?;
     let amplitudes = rigid_motion("");
     let physics = FrameShift { centre_m: context.volume_centre_m() };
@@ -54,7 +54,7 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
 impl Physics for FrameShift {
     fn deform<D: Scalar>(&self, theta: &[D], _x: &Drivers<'_>, change: &mut Deformation<D>) {
         let turn = [theta[3], theta[4], theta[5]];
-        let move_m = about(&self.centre_m.map(D::from), turn);
+        let move_m = pivot_translation_m(&self.centre_m.map(D::from), turn);
         change.twist(Slot::WORLD, [theta[0] + move_m[0], theta[1] + move_m[1], theta[2] + move_m[2]], turn);
     }
 }
@@ -65,7 +65,7 @@ pub(super) fn rigid_motion(of: &str) -> Vec<Parameter> {
 }
 
 /// The translation that makes a turn about the frame's origin one about `pivot`: `c - Exp(w) c`.
-pub(super) fn about<D: Scalar>(pivot_m: &Vector3<D>, turn_rad: [D; 3]) -> [D; 3] {
+pub(super) fn pivot_translation_m<D: Scalar>(pivot_m: &Vector3<D>, turn_rad: [D; 3]) -> [D; 3] {
     let rotation = rotation_of_vector(&Vector3::from(turn_rad));
     let moved = rotation * pivot_m;
     [0, 1, 2].map(|axis| pivot_m[axis] - moved[axis])

@@ -25,7 +25,7 @@
 //! Armstrong-Helouvry, Dupont, Canudas de Wit 1994 (Automatica 30:7): stick and slip;
 //! Visintin, Differential Models of Hysteresis, 1994, ch. III: the play operator.
 
-use super::play::{BEGUN_DEG, lagging};
+use super::play::{BEGUN_DEG, led_play_displacement};
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -34,7 +34,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Direction,
     shapes: &[LED],
     confused_with: &["backlash"],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
@@ -46,7 +46,7 @@ struct FrictionWindup {
     shares: TorqueTerms,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     context.loaded(joint)?;
     let shares = TorqueTerms::of(context, joint);
@@ -65,6 +65,7 @@ impl Physics for FrictionWindup {
         let load = torque.total_nm().abs() - links;
         let windup = self.shares.sum(theta, links, outer, load);
         let (memory, arrival) = (x.path_memory_rad(self.joint), x.arrival[self.joint]);
-        change.joint(self.joint, lagging(windup * 2.0, BEGUN_DEG.to_radians(), memory, arrival));
+        change
+            .joint(self.joint, led_play_displacement(windup * 2.0, BEGUN_DEG.to_radians(), memory, arrival));
     }
 }

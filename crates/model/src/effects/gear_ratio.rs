@@ -34,7 +34,7 @@ pub(super) const KIND: EffectKind = EffectKind {
         "link_bending",
         "base_compliance",
     ],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
@@ -45,7 +45,7 @@ struct GearRatio {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     let scale = amplitude("scale", Unit::One, 0.008, 0.3, "relative error of the joint angle");
     Ok(Placement::new(vec![scale], GearRatio { joint }))

@@ -43,7 +43,7 @@ pub(super) const KIND: EffectKind = EffectKind {
             upper: 10.0,
             meaning: "drag as a fraction of the largest gravity torque",
             parameter: true,
-            values: Some(drags),
+            values: Some(friction_values),
         },
         Shape {
             name: "smoothing",
@@ -53,7 +53,7 @@ pub(super) const KIND: EffectKind = EffectKind {
             upper: 10.0,
             meaning: "width of the change of flank as a fraction of the largest gravity torque",
             parameter: true,
-            values: Some(sharp),
+            values: Some(smoothing_values),
         },
         Shape {
             name: "outer",
@@ -63,14 +63,14 @@ pub(super) const KIND: EffectKind = EffectKind {
             upper: 10.0,
             meaning: "weight of the outer links relative to their default masses",
             parameter: true,
-            values: Some(weights),
+            values: Some(outer_weight_values),
         },
         SEATED,
         REST,
     ],
     never_negative: &["width"],
     confused_with: &["backlash", "compliance", "arm_compliance"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::LostMotion],
     ..EffectKind::PLAIN
 };
@@ -81,7 +81,7 @@ struct GravityBacklash {
     per_torque: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     context.loaded(joint)?;
     let (typical, bound) = (context.joint_size(joint, 0.5), context.joint_size(joint, 8.0));
@@ -90,17 +90,17 @@ fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
     Ok(Placement::new(vec![width], GravityBacklash { joint, per_torque }))
 }
 
-fn drags(_placing: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn friction_values(_placing: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     vec![0.05, 0.1, 0.2, 0.3, 0.5]
 }
 
 /// A rigid gap changes flanks at once; the default allows for masses that nobody knows.
-fn sharp(_placing: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn smoothing_values(_placing: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     vec![0.01]
 }
 
 /// The last joint has no outer links.
-fn weights(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn outer_weight_values(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     match context.spec.target {
         Some(joint) if context.zero.joints.get(joint).is_some_and(|j| j.links.len() > 1) => {
             vec![0.5, 0.65, 0.8, 1.25, 1.5, 2.0, 3.0]

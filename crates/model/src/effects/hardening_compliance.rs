@@ -31,7 +31,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Load,
     shapes: &[SEATED],
     confused_with: &["compliance", "gravity_backlash"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
@@ -45,7 +45,7 @@ struct HardeningCompliance {
     per_torque: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     context.loaded(joint)?;
     let shares = TorqueTerms::of(context, joint);

@@ -27,7 +27,7 @@ impl Model {
         let mut parameters = self.parameters().to_vec();
         let mut placed = self.effects().to_vec();
         for spec in specs {
-            let (effect, own) = placed::place(self, session, spec, &zero, parameters.len())?;
+            let (effect, own) = placed::place_effect(self, session, spec, &zero, parameters.len())?;
             placed.push(effect);
             parameters.extend(own);
         }
@@ -76,7 +76,7 @@ impl Model {
         observations: &[Observation],
     ) -> Vec<(EffectSpec, Vec<EffectSpec>)> {
         let zero = self.zero_pose();
-        let steps = steps(observations);
+        let steps = step_dwells(observations);
         let mut families = Vec::new();
         for kind in catalogue() {
             for spec in self.targets(kind, EffectSpec::new(kind.name)) {
@@ -84,13 +84,14 @@ impl Model {
                 if kind.offered == Offered::Events {
                     let at = |dwell: DwellId| spec.clone().since(Since::Dwell(dwell));
                     let first = steps.first().map(|(dwell, _)| at(*dwell));
-                    let placed = first.and_then(|spec| placed::place(self, session, &spec, &zero, 0).ok());
+                    let placed =
+                        first.and_then(|spec| placed::place_effect(self, session, &spec, &zero, 0).ok());
                     let least = placed.map_or(0, |(effect, _)| least_dwells(effect.amplitudes));
                     let telling = steps.iter().filter(|(_, side)| *side >= least);
                     members.extend(telling.map(|(dwell, _)| at(*dwell)));
                 }
                 let context = EffectContext { model: self, session, spec: &spec, kind, zero: &zero };
-                members.extend(shaped(&context, observations));
+                members.extend(shape_variants(&context, observations));
                 members.retain(|spec| self.offers(spec, session, &zero));
                 if !members.is_empty() {
                     families.push((spec, members));
@@ -107,7 +108,7 @@ impl Model {
 
     /// Whether an effect could be added here, with something for a fit to find.
     fn offers(&self, spec: &EffectSpec, session: &Session, zero: &NominalPose) -> bool {
-        let placed = placed::place(self, session, spec, zero, 0);
+        let placed = placed::place_effect(self, session, spec, zero, 0);
         placed.is_ok_and(|(effect, own)| own[..effect.amplitudes].iter().any(|p| p.free))
     }
 
@@ -147,7 +148,7 @@ impl Model {
 }
 
 /// Four significant digits: the value stands in a name, and no data tell it better.
-fn readable(value: f64) -> f64 {
+fn round_significant(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
@@ -177,7 +178,7 @@ pub fn least_dwells(amplitudes: usize) -> usize {
 /// The dwells at which a step can be told from noise, in the order of time, each with how many dwells of its recording
 /// are on the shorter side of it: beyond it a pose of the board may be free. A step that only sets the first or the last
 /// recording apart is that recording's own event.
-fn steps(observations: &[Observation]) -> Vec<(DwellId, usize)> {
+fn step_dwells(observations: &[Observation]) -> Vec<(DwellId, usize)> {
     let all: Vec<DwellId> =
         observations.iter().map(|o| o.dwell).collect::<BTreeSet<_>>().into_iter().collect();
     let recordings: BTreeSet<usize> = all.iter().map(|dwell| dwell.recording).collect();
@@ -205,12 +206,12 @@ fn steps(observations: &[Observation]) -> Vec<(DwellId, usize)> {
 /// A kind with every value of a shape that is worth trying, and with every two of different shapes: where a torque changes
 /// sign and how sharply, say, is seen only together. Who holds the arm is asked of each kind by itself: with another shape
 /// beside it a base that rocks at the height of a joint is that joint's spring.
-fn shaped(context: &EffectContext<'_>, observations: &[Observation]) -> Vec<EffectSpec> {
+fn shape_variants(context: &EffectContext<'_>, observations: &[Observation]) -> Vec<EffectSpec> {
     let searched = context.kind.shapes.iter().filter(|shape| shape.parameter);
     let searched = searched.filter_map(|shape| Some((shape.name, shape.values?(context, observations))));
     let searched: Vec<(&str, Vec<f64>)> = searched.collect();
     let with = |spec: &EffectSpec, (name, values): &(&str, Vec<f64>)| -> Vec<EffectSpec> {
-        values.iter().map(|v| spec.clone().with(name, readable(*v))).collect()
+        values.iter().map(|v| spec.clone().with(name, round_significant(*v))).collect()
     };
     let mut members: Vec<EffectSpec> = searched.iter().flat_map(|shape| with(context.spec, shape)).collect();
     let own: Vec<_> = searched.iter().filter(|(name, _)| *name != SEATED.name).collect();

@@ -24,7 +24,7 @@
 //! # Source
 //! Gere and Timoshenko, Mechanics of Materials, app. G; Klimchik et al., arXiv 1211.5739.
 
-use super::frame_shift::about;
+use super::frame_shift::pivot_translation_m;
 use super::prelude::*;
 
 pub(super) const KIND: EffectKind = EffectKind {
@@ -34,7 +34,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[SEATED],
     never_negative: &["sag", "sag_load"],
     confused_with: &["compliance", "belt_compliance", "base_compliance", "hardening_compliance"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Springs],
     ..EffectKind::PLAIN
 };
@@ -55,7 +55,7 @@ struct LinkBending {
     per_load_sag: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let link = context.joint()?;
     let zero = context.zero;
     if zero.outer(link).is_empty() {
@@ -100,9 +100,9 @@ impl Physics for LinkBending {
         };
         let load_n = loads(&|_, kg| gravity * kg);
         let load_nm = loads(&|at_m, kg| (at_m - end).cross(&(gravity * kg)));
-        let links = bend(&beam, &links_n, &links_nm).map(|v| v * self.per_sag);
-        let outer = bend(&beam, &Vector3::zeros(), &links_nm).map(|v| v * self.per_sag);
-        let load = bend(&beam, &load_n, &load_nm).map(|v| v * self.per_load_sag);
+        let links = cantilever_deflection(&beam, &links_n, &links_nm).map(|v| v * self.per_sag);
+        let outer = cantilever_deflection(&beam, &Vector3::zeros(), &links_nm).map(|v| v * self.per_sag);
+        let load = cantilever_deflection(&beam, &load_n, &load_nm).map(|v| v * self.per_load_sag);
         let joint = &pose.joints[self.next];
         let slot = &joint.before;
         let part = |k: usize, axis: usize| {
@@ -111,7 +111,7 @@ impl Physics for LinkBending {
         };
         let turn = [part(1, 0), part(1, 1), part(1, 2)];
         let pivot_m = slot.rotation.tr_mul(&(end - slot.translation_m));
-        let back = about(&pivot_m.map(D::from), turn);
+        let back = pivot_translation_m(&pivot_m.map(D::from), turn);
         change.twist(
             Slot::Before(joint.segment),
             [part(0, 0) + back[0], part(0, 1) + back[1], part(0, 2) + back[2]],
@@ -121,7 +121,11 @@ impl Physics for LinkBending {
 }
 
 /// Deflection and slope at the end of a clamped beam under a force and a moment there, for EI = 1.
-fn bend(beam_m: &Vector3<f64>, force_n: &Vector3<f64>, moment_nm: &Vector3<f64>) -> [Vector3<f64>; 2] {
+fn cantilever_deflection(
+    beam_m: &Vector3<f64>,
+    force_n: &Vector3<f64>,
+    moment_nm: &Vector3<f64>,
+) -> [Vector3<f64>; 2] {
     let a = beam_m.norm();
     // The nominal link never has length zero here; a degenerate pose gives no bending.
     let Some(e) = beam_m.try_normalize(1e-9) else { return [Vector3::zeros(); 2] };

@@ -29,12 +29,12 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Marker,
     offered: Offered::Events,
     confused_with: &["tool_shift", "zero_slip"],
-    place,
+    place: effect_placement,
     look_at: "That marker came loose, was knocked or put on again: look at its mount, and at the recording around that time.",
     ..EffectKind::PLAIN
 };
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let (name, first) = context.marker()?;
     context.event()?;
     let meaning = format!("shift of marker {name} on its link along");

@@ -36,7 +36,7 @@ impl Measure {
             (Measure::Wrong(why), _) | (_, Measure::Wrong(why)) => Measure::Wrong(why),
             (Measure::Known(a), Measure::Known(b)) if a == b => Measure::Known(a),
             (Measure::Known(a), Measure::Known(b)) => {
-                Measure::Wrong(format!("it adds {} to {}", symbol(&b), symbol(&a)))
+                Measure::Wrong(format!("it adds {} to {}", dimension_symbol(&b), dimension_symbol(&a)))
             }
             (known @ Measure::Known(_), _) | (_, known @ Measure::Known(_)) => known,
             _ => Measure::Anything,
@@ -82,7 +82,7 @@ impl Algebra for Measure {
             (Measure::Wrong(why), _) | (_, Measure::Wrong(why)) => Measure::Wrong(why),
             (Measure::Known(d), Measure::Literal(n)) => Measure::Known(d.map(|power| power * n)),
             (_, Measure::Known(d)) if d != [0.0; 4] => {
-                Measure::Wrong(format!("its exponent is in {}", symbol(&d)))
+                Measure::Wrong(format!("its exponent is in {}", dimension_symbol(&d)))
             }
             _ => Measure::Anything,
         }
@@ -104,7 +104,7 @@ impl Algebra for Measure {
             (Function::Sign, _) => Measure::Known([0.0; 4]),
             (function, Measure::Known(d)) if d != [0.0; 4] => {
                 let name = format!("{function:?}").to_lowercase();
-                Measure::Wrong(format!("it takes the {name} of {}", symbol(&d)))
+                Measure::Wrong(format!("it takes the {name} of {}", dimension_symbol(&d)))
             }
             _ => Measure::Known([0.0; 4]),
         }
@@ -133,7 +133,7 @@ pub(super) fn dimension(unit: Unit) -> Dimension {
 }
 
 /// A dimension in words: the unit that has it, or its powers.
-pub(super) fn symbol(d: &Dimension) -> String {
+pub(super) fn dimension_symbol(d: &Dimension) -> String {
     if *d == [0.0; 4] {
         return "an angle or a number".to_owned();
     }

@@ -100,7 +100,7 @@ impl NominalPose {
             let value = joint.at(joint_rad.get(joint.index).copied().unwrap_or(f64::NAN));
             let link = pose.links.len();
             let axis =
-                JointAxis { links: link..link + 1, ..axis(id, segment, before, &ends[id], (p, value)) };
+                JointAxis { links: link..link + 1, ..joint_axis(id, segment, before, &ends[id], (p, value)) };
             pose.begin_link(arm, parent, &axis);
             part_of.push((arm, Some(link)));
             match joint.mimic {
@@ -158,7 +158,7 @@ impl NominalPose {
         }
         self.declared = declared.iter().map(|body| body.mass_kg > 0.0).collect();
         for (link, body) in self.links.iter_mut().zip(declared) {
-            link.body = if body.mass_kg > 0.0 { body } else { spread(link) };
+            link.body = if body.mass_kg > 0.0 { body } else { uniform_link_body(link) };
         }
     }
 
@@ -300,7 +300,7 @@ impl NominalPose {
 }
 
 /// The axis of the joint that a segment holds, at `value` [rad] (prismatic: [m]).
-fn axis(
+fn joint_axis(
     id: SegmentId,
     segment: &Segment,
     before: Rigid<f64>,
@@ -326,7 +326,7 @@ fn axis(
 }
 
 /// What a link weighs that weighs as much as it is long.
-fn spread(link: &Link) -> Body {
+fn uniform_link_body(link: &Link) -> Body {
     let mut all = Body::NONE;
     for to_m in &link.to_m {
         let mass_kg = LINK_DENSITY_KGPM * (to_m - link.from_m).norm();

@@ -37,7 +37,7 @@ pub(super) const KIND: EffectKind = EffectKind {
         parameter: true,
         values: Some(frequencies),
     }],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
@@ -57,7 +57,7 @@ struct Periodic {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     Ok(Placement::new(amplitudes_wave(0.15, 3.0, "(n q)"), Periodic { joint }))
 }

@@ -8,7 +8,7 @@ use super::physics::{AnyPhysics, Deformation, Slot};
 use super::session::Session;
 use super::spec::EffectSpec;
 use super::state;
-use crate::error::hint;
+use crate::error::similar_name_hint;
 use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
 use crate::tree::{Route, Tree, TreeAt};
@@ -94,7 +94,7 @@ pub(crate) struct Linearised {
 }
 
 /// Places one effect whose parameters start at `first`; gives it and its parameters.
-pub(crate) fn place(
+pub(crate) fn place_effect(
     model: &Model,
     session: &Session,
     spec: &EffectSpec,
@@ -108,7 +108,8 @@ pub(crate) fn place(
     let Placement { amplitudes, physics, slots, distorts } = (kind.place)(&context).map_err(bad)?;
     let count = amplitudes.len();
     let mut parameters = amplitudes;
-    let shapes = kind.shapes.iter().filter(|shape| shape.parameter && state::matters(shape, &context));
+    let shapes =
+        kind.shapes.iter().filter(|shape| shape.parameter && state::is_shape_relevant(shape, &context));
     parameters.extend(shapes.map(|shape| {
         let (name, meaning) = (shape.name.to_owned(), shape.meaning.to_owned());
         let nominal = context.shape(shape.name).unwrap_or_default();
@@ -122,7 +123,7 @@ pub(crate) fn place(
     for (quantity, change) in &spec.overrides {
         let Some(own) = parameters.iter_mut().find(|p| p.name == *quantity) else {
             let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
-            let hint = hint(quantity, known.iter().copied());
+            let hint = similar_name_hint(quantity, known.iter().copied());
             return Err(bad(format!(
                 "it has no parameter \"{quantity}\"{hint} It has: {}",
                 known.join(", ")
@@ -176,7 +177,7 @@ impl Effects {
         let mut slots: Vec<Slot> = placed.iter().flat_map(|effect| effect.slots.iter().copied()).collect();
         slots.sort_unstable();
         slots.dedup();
-        let (tree, places) = twisted(model.tree(), &slots, count);
+        let (tree, places) = tree_with_twists(model.tree(), &slots, count);
         let route = |rigid: &Route| tree.route(rigid.last().map_or(0, |end| places[*end]));
         let routes = model.routes().map(route).collect();
         Effects { placed, session, tree, routes, slots }
@@ -402,7 +403,7 @@ impl Effects {
 }
 
 /// A tree with six parameters of a twist, behind `count` others, at every slot; and where each of its segments is now.
-fn twisted(rigid: &Tree, slots: &[Slot], count: usize) -> (Tree, Vec<usize>) {
+fn tree_with_twists(rigid: &Tree, slots: &[Slot], count: usize) -> (Tree, Vec<usize>) {
     let mut tree = Tree(Vec::with_capacity(rigid.0.len() + slots.len()));
     // Where each segment is in it, and what its children hang on: itself, or the twist behind it.
     let (mut places, mut ends): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());

@@ -35,7 +35,7 @@ pub(super) const BEGUN_DEG: f64 = 0.3;
 
 /// [`lost_motion_rad`] of a width that a fit begins with at zero: there it grows in proportion, as to a gap that has `begun`.
 /// Without a remembered path by the direction of `arrival`.
-pub(super) fn following<D: Scalar>(width: D, begun: f64, memory: &[f64], arrival: f64) -> D {
+pub(super) fn play_displacement<D: Scalar>(width: D, begun: f64, memory: &[f64], arrival: f64) -> D {
     if memory.len() < 2 {
         width * (-0.5 * arrival)
     } else if width.re() == 0.0 {
@@ -45,16 +45,16 @@ pub(super) fn following<D: Scalar>(width: D, begun: f64, memory: &[f64], arrival
     }
 }
 
-/// [`following`], for a joint that may be led by hand: where the width is negative the link leads, and an encoder that
+/// [`play_displacement`], for a joint that may be led by hand: where the width is negative the link leads, and an encoder that
 /// moved, however little, was pushed by the flank it was pushed from; what the link did within its gap afterwards
 /// nobody recorded.
-pub(super) fn lagging<D: Scalar>(width: D, begun: f64, memory: &[f64], arrival: f64) -> D {
+pub(super) fn led_play_displacement<D: Scalar>(width: D, begun: f64, memory: &[f64], arrival: f64) -> D {
     match memory {
         [.., before, rest] if width.re() < 0.0 => {
             let last_move = if rest == before { 0.0 } else { (rest - before).signum() };
             width * (-0.5 * last_move)
         }
-        _ => following(width, begun, memory, arrival),
+        _ => play_displacement(width, begun, memory, arrival),
     }
 }
 

@@ -29,7 +29,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Never,
     confused_with: &["board_scale"],
-    place,
+    place: effect_placement,
     ..EffectKind::PLAIN
 };
 
@@ -38,7 +38,7 @@ struct SeatOffset {
     cavities: Vec<String>,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let cavities = context.session.cavities.clone();
     if cavities.is_empty() {
         return Err("no observation is seated in the board".to_owned());

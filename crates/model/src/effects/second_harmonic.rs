@@ -27,13 +27,13 @@ pub(super) const KIND: EffectKind = EffectKind {
     summary: "an error twice a turn of the joint",
     family: Family::Transmission,
     confused_with: &["eccentricity", "gear_ratio", "compliance", "belt_coupling", "axis_tilt"],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::Turns],
     ..EffectKind::PLAIN
 };
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.turning_joint()?;
     Ok(Placement::new(amplitudes_wave(0.15, 3.0, " 2q"), Harmonic { joint, harmonic: 2.0 }))
 }

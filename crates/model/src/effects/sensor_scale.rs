@@ -29,7 +29,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     family: Family::Sensor,
     target: Target::Whole,
     confused_with: &["volume_distortion"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Lengths],
     ..EffectKind::PLAIN
 };
@@ -39,7 +39,7 @@ struct SensorScale {
     centre_m: Vector3<f64>,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let centre_m = context.session.volume_centre_m.ok_or("no observation comes from a position sensor")?;
     let amplitudes = amplitudes_xyz("", Unit::One, 0.004, 0.05, "relative error of scale along");
     Ok(Placement::distorting(amplitudes, SensorScale { centre_m }))

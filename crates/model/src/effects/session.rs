@@ -107,5 +107,5 @@ fn largest_effort(observations: &[Observation]) -> Option<Vec<f64>> {
         let mut sizes = observations.iter().map(|o| Some(o.effort_of(joint)?.abs()));
         sizes.try_fold(0.0, |largest: f64, size| Some(largest.max(size?))).unwrap_or(f64::NAN)
     };
-    gaps::known((0..observations.first()?.joint_rad.len()).map(largest).collect())
+    gaps::if_any_known((0..observations.first()?.joint_rad.len()).map(largest).collect())
 }

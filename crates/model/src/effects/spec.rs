@@ -8,7 +8,7 @@ use super::expression::Expression;
 use super::table::Override;
 use super::{EffectKind, Family, Target, catalogue, find};
 use crate::ModelError;
-use crate::error::{hint, nearest};
+use crate::error::{most_similar, similar_name_hint};
 use armcal_core::DwellId;
 use std::collections::BTreeMap;
 
@@ -213,7 +213,7 @@ fn known_kind(kind: &str) -> Result<&'static EffectKind, ModelError> {
         let names = || catalogue().iter().map(|entry| entry.name);
         ModelError::UnknownEffect {
             kind: kind.to_owned(),
-            nearest: nearest(kind, names()),
+            nearest: most_similar(kind, names()),
             known: names().collect::<Vec<_>>().join(", "),
         }
     })
@@ -227,7 +227,7 @@ pub(crate) fn joint_index(text: &str, joint_names: &[String]) -> Result<usize, S
         return if within { Ok(number - 1) } else { Err(wrong()) };
     }
     joint_names.iter().position(|name| name == text).ok_or_else(|| {
-        let hint = hint(text, joint_names.iter().map(String::as_str));
+        let hint = similar_name_hint(text, joint_names.iter().map(String::as_str));
         format!("there is no joint \"{text}\"{hint} The joints are {}", joint_names.join(", "))
     })
 }

@@ -28,13 +28,13 @@ pub(super) const SEATED: Shape = Shape {
     upper: 2.0,
     meaning: "share of it that acts while a cavity holds the tip: 0 where the hand carries what a servo carries elsewhere",
     parameter: true,
-    values: Some(carried),
+    values: Some(carried_shares),
 };
 
 /// How much of a lost motion does.
 pub(super) const LED: Shape = Shape {
     meaning: "share of it that acts while a cavity holds the tip: negative where a hand leads the link, which lags elsewhere",
-    values: Some(led),
+    values: Some(led_shares),
     ..SEATED
 };
 
@@ -51,11 +51,11 @@ pub(super) const REST: Shape = Shape {
 };
 
 /// In a cavity a joint may rest within its play: less than all of it.
-fn led(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn led_shares(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     worth_trying(context, &[-1.0, -0.75, -0.5, 0.0, 0.5])
 }
 
-fn carried(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
+fn carried_shares(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     worth_trying(context, &[0.0])
 }
 
@@ -65,7 +65,7 @@ fn worth_trying(context: &EffectContext<'_>, shares: &[f64]) -> Vec<f64> {
 
 /// Whether a shape has a say: who holds the tip matters only where both do, or where somebody says that it does; where a
 /// joint rests, only where somebody says it.
-pub(super) fn matters(shape: &Shape, context: &EffectContext<'_>) -> bool {
+pub(super) fn is_shape_relevant(shape: &Shape, context: &EffectContext<'_>) -> bool {
     let said = context.spec.shape.iter().any(|(name, _)| name == shape.name);
     match shape.name {
         name if name == SEATED.name => said || context.session.seated_and_tracked(),
@@ -92,7 +92,7 @@ pub(super) fn servo_elsewhere(spec: &EffectSpec) -> bool {
     spec.shape.iter().any(|(name, share)| name == SEATED.name && *share != 1.0)
 }
 
-fn seated(x: &Drivers<'_>) -> bool {
+fn is_seated(x: &Drivers<'_>) -> bool {
     x.observation.cavity().is_some()
 }
 
@@ -116,7 +116,7 @@ impl InState {
 
     /// Where the share of the amplitudes stands that acts in an observation, if not all of them do.
     fn share_in(&self, x: &Drivers<'_>) -> Option<usize> {
-        self.share.filter(|_| seated(x))
+        self.share.filter(|_| is_seated(x))
     }
 }
 

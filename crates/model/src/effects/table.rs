@@ -20,7 +20,7 @@ use super::Target;
 use super::expression::Expression;
 use super::spec::{EffectSpec, Since, joint_index};
 use crate::ModelError;
-use crate::error::hint;
+use crate::error::similar_name_hint;
 use armcal_core::{Parameter, Unit};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -161,7 +161,7 @@ impl EffectTable {
 
 fn unknown_key(key: &str) -> String {
     let known = ["kind", "target", "since", "name", "formula", "acts_on", "one_of", "parameters"];
-    format!("there is no key \"{key}\"{}", hint(key, known.into_iter()))
+    format!("there is no key \"{key}\"{}", similar_name_hint(key, known.into_iter()))
 }
 
 impl From<&EffectSpec> for EffectTable {

@@ -27,7 +27,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Temperature,
     target: Target::Whole,
     confused_with: &["zero_drift", "frame_drift", "warm_up"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Lengths, Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
@@ -38,7 +38,7 @@ struct ThermalGrowth {
     thermometer: bool,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let thermometer = context.session.temperature;
     let growth = if thermometer {
         amplitude("expansion", Unit::PerKelvin, 3e-5, 1e-3, "relative growth of every length per kelvin")

@@ -30,7 +30,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     offered: Offered::Events,
     shapes: &[ARM],
     confused_with: &["zero_slip", "frame_shift"],
-    place,
+    place: effect_placement,
     look_at: "The tool or its markers were remounted, bent or knocked: look at the last link.",
     lookalikes: &[Lookalikes::Moments, Lookalikes::Slow],
     ..EffectKind::PLAIN
@@ -43,7 +43,7 @@ pub(super) struct Moved {
     pub first: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.event()?;
     let amplitudes = shift_xyz("shift on the last link along");
     let first = context.model.tip_segment(context.arm()?).parameters.start;

@@ -34,7 +34,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     offered: Offered::Recordings,
     shapes: &[ARM],
     confused_with: &["zero_slip", "frame_shift", "tool_shift"],
-    place,
+    place: effect_placement,
     look_at: "Weigh what the tool carried in that recording, and declare it as `load_kg`.",
     told_by: "weigh what the tool carries, and declare it as `load_kg`",
     ..EffectKind::PLAIN
@@ -46,7 +46,7 @@ struct UndeclaredLoad {
     joints: Vec<(usize, f64)>,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.event()?;
     let loaded = |joint: &usize| context.motion(*joint) == Motion::Revolute && context.loaded(*joint).is_ok();
     let stretched = |joint| (joint, (context.gravity_mps2() * context.reach_m(joint)).max(1e-3));

@@ -33,7 +33,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Approach,
     shapes: &[SEATED],
     confused_with: &["backlash", "friction_windup"],
-    place,
+    place: effect_placement,
     look_at: "Read the joints later, when arm and readings have settled: look at waiting times, filters and whether set-points are recorded.",
     told_by: "wait longer before the joints are read, or come to the same poses from near and from far",
     ..EffectKind::PLAIN
@@ -47,7 +47,7 @@ struct UnsettledReading {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     if !context.session.moved {
         return Err("no observation says where the joints rested before".to_owned());

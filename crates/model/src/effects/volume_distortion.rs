@@ -29,7 +29,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     family: Family::Sensor,
     target: Target::Whole,
     confused_with: &["sensor_scale"],
-    place,
+    place: effect_placement,
     ..EffectKind::PLAIN
 };
 
@@ -39,7 +39,7 @@ struct VolumeDistortion {
     per_extent: f64,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let centre_m = context.session.volume_centre_m.ok_or("no observation comes from a position sensor")?;
     let edge = amplitude("edge", Unit::Metre, 0.5e-3, 0.02, "outward error at the edge of the volume");
     let mut amplitudes = vec![edge];

@@ -38,7 +38,7 @@ pub(super) const KIND: EffectKind = EffectKind {
         values: Some(time_constants),
     }],
     confused_with: &["thermal_growth", "zero_drift", "frame_drift"],
-    place,
+    place: effect_placement,
     lookalikes: &[Lookalikes::Lengths, Lookalikes::Slow],
     ..EffectKind::PLAIN
 };
@@ -48,7 +48,7 @@ struct WarmUp {
     lengths: Vec<(usize, f64)>,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.lasting()?;
     let growth = amplitude("growth", Unit::One, 7e-4, 0.02, "relative growth of every length once warm");
     Ok(Placement::new(vec![growth], WarmUp { lengths: context.model.lengths_m() }))

@@ -25,7 +25,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     family: Family::Drift,
     toggle: Toggle::Time,
     confused_with: &["frame_drift", "thermal_growth", "warm_up", "zero_slip"],
-    place,
+    place: effect_placement,
     of_a_make: true,
     lookalikes: &[Lookalikes::Slow],
     ..EffectKind::PLAIN
@@ -36,7 +36,7 @@ struct ZeroDrift {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     context.lasting()?;
     let (typical, bound) = (context.joint_size(joint, 0.3), context.joint_size(joint, 8.0));

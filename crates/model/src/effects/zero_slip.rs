@@ -29,7 +29,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Recording,
     offered: Offered::Events,
     confused_with: &["frame_shift", "tool_shift", "zero_drift"],
-    place,
+    place: effect_placement,
     look_at: "An encoder or a belt slipped: look at that joint's encoder coupling, set-screws and belt teeth, and home it again.",
     lookalikes: &[Lookalikes::Moments],
     ..EffectKind::PLAIN
@@ -40,7 +40,7 @@ struct ZeroSlip {
     joint: usize,
 }
 
-fn place(context: &EffectContext<'_>) -> Result<Placement, String> {
+fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     let joint = context.joint()?;
     context.event()?;
     let (typical, bound) = (context.joint_size(joint, 0.4), context.joint_size(joint, 180.0));

@@ -4,7 +4,7 @@
 //! where it was and is fixed. Everything that is asked of an observation is answered by the model as its recording knows it:
 //! without the boards and copies of the others, and with its own copies in the place of the originals.
 
-use super::{Model, check_names, restart};
+use super::{Model, check_names, set_start_pose};
 use crate::ModelError;
 use crate::segment::Segment;
 use armcal_core::{Observation, Parameter, Pose};
@@ -72,7 +72,7 @@ impl Model {
         for recording in recordings {
             let mut start = self.parameters.clone();
             if let Some(base_in_world) = recording.base_in_world {
-                restart(&mut self.tree.0[0].clone(), &mut start, base_in_world);
+                set_start_pose(&mut self.tree.0[0].clone(), &mut start, base_in_world);
             }
             model.parameters.extend(own.iter().map(|&index| Parameter {
                 name: format!("{}.{}", recording.name, start[index].name),
@@ -255,7 +255,7 @@ impl View {
         let lengths = model.lengths.iter().map(|length| now(*length)).collect();
         // A rotation vector counts from where the frame starts: it moves with its parameters, or not at all.
         if let Some(start) = scopes.bases[recording].filter(|_| base.clone().all(|k| index[k] != k)) {
-            restart(&mut tree.0[0], &mut parameters, start);
+            set_start_pose(&mut tree.0[0], &mut parameters, start);
         }
         let board = |board: &Segment| {
             let parameters = in_tree..in_tree + board.parameters.len();

@@ -38,7 +38,7 @@ pub(crate) fn too_many(xml: &str) -> Option<u32> {
 }
 
 /// Says so.
-pub(crate) fn problem() -> String {
+pub(crate) fn too_many_problem() -> String {
     format!("has more than {MOST} attributes; a URDF needs no more than six")
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn problem() -> String {
 pub fn check_xml(xml: &str) -> Result<(), String> {
     match too_many(xml) {
         None => Ok(()),
-        Some(line) => Err(format!("line {line}: an element {}", problem())),
+        Some(line) => Err(format!("line {line}: an element {}", too_many_problem())),
     }
 }
 

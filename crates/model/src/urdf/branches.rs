@@ -1,10 +1,10 @@
 //! Which joints of a URDF lead from its base to what is measured, and what hangs beside them.
 
 use super::reader::{Reader, child};
-use super::{limits, motion_of};
+use super::{motion_of, read_limits};
 use crate::ModelError;
 use crate::rigid::Rigid;
-use crate::segment::{Body, Mimic, moved};
+use crate::segment::{Body, Mimic, joint_transform};
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -118,7 +118,7 @@ impl<'a, 'x> Branches<'a, 'x> {
         let Some(mimic) = child(joint, "mimic").filter(|_| joint.attribute("type") != Some("fixed")) else {
             return Ok(None);
         };
-        let subject = subject(joint);
+        let subject = joint_subject(joint);
         let leader = self.reader.required(mimic, &format!("mimic of {subject}"), "joint")?;
         let number = |name: &str, default: f64| match mimic.attribute(name) {
             None => Ok(default),
@@ -135,7 +135,7 @@ impl<'a, 'x> Branches<'a, 'x> {
 
     /// The link that the joint of this name moves, which a joint follows.
     fn link_of(&self, follower: Node<'a, 'x>, leader: &str) -> Result<&'a str, ModelError> {
-        let wrong = |problem: String| self.reader.error(follower, subject(follower), problem);
+        let wrong = |problem: String| self.reader.error(follower, joint_subject(follower), problem);
         let joint = *self
             .joints
             .get(leader)
@@ -183,12 +183,12 @@ impl<'a, 'x> Branches<'a, 'x> {
 
     /// Where a joint puts its link when it is as near to zero as its limits let it be.
     fn at_rest(&self, joint: Node<'a, 'x>) -> Result<Rigid<f64>, ModelError> {
-        let subject = subject(joint);
+        let subject = joint_subject(joint);
         let origin = Rigid::from(&self.reader.origin(joint, &subject)?);
-        let value = limits(joint).map_or(0.0, |[low, high]| 0f64.clamp(low, high));
+        let value = read_limits(joint).map_or(0.0, |[low, high]| 0f64.clamp(low, high));
         let motion = motion_of(joint.attribute("type").unwrap_or_default());
         let Some(motion) = motion else { return Ok(origin) };
-        Ok(origin.then(&moved(&self.reader.axis(joint, &subject)?, value, motion)))
+        Ok(origin.then(&joint_transform(&self.reader.axis(joint, &subject)?, value, motion)))
     }
 }
 
@@ -206,6 +206,6 @@ pub(super) fn by_name<'a, 'x>(
 }
 
 /// A joint as errors name it.
-fn subject(joint: Node<'_, '_>) -> String {
+fn joint_subject(joint: Node<'_, '_>) -> String {
     format!("joint \"{}\"", joint.attribute("name").unwrap_or_default())
 }

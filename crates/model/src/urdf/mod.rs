@@ -107,7 +107,7 @@ fn motion_of(form: &str) -> Option<Motion> {
 }
 
 /// What `<limit>` says of a joint that has ends; what cannot be an interval of readings says nothing.
-fn limits(joint: Node<'_, '_>) -> Option<[f64; 2]> {
+fn read_limits(joint: Node<'_, '_>) -> Option<[f64; 2]> {
     let limit = child(joint, "limit").filter(|_| joint.attribute("type") != Some("continuous"))?;
     let end = |name| limit.attribute(name)?.trim().parse::<f64>().ok().filter(|x| x.is_finite());
     let (low, high) = (end("lower")?, end("upper")?);
@@ -178,7 +178,7 @@ impl<'a> Built<'a> {
         let joint = match branches.followed(joint)? {
             None => {
                 self.joint_names.push(name.to_owned());
-                self.joint_limits.push(limits(kept.joint));
+                self.joint_limits.push(read_limits(kept.joint));
                 Joint::read(self.joint_names.len() - 1, motion)
             }
             Some((leader, mimic)) => {

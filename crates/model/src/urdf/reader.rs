@@ -2,7 +2,7 @@
 
 use super::attributes;
 use crate::ModelError;
-use crate::error::nearest;
+use crate::error::most_similar;
 use crate::segment::Body;
 use armcal_core::Pose;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -12,7 +12,7 @@ use std::path::Path;
 /// Parses XML; an error names the line.
 pub(crate) fn parse<'x>(xml: &'x str, path: &Path) -> Result<Document<'x>, ModelError> {
     if let Some(line) = attributes::too_many(xml) {
-        let (subject, problem) = ("an element".to_owned(), attributes::problem());
+        let (subject, problem) = ("an element".to_owned(), attributes::too_many_problem());
         return Err(ModelError::Urdf { path: path.to_owned(), line, subject, problem });
     }
     Document::parse(xml).map_err(|cause| ModelError::UrdfXml {
@@ -111,7 +111,7 @@ impl<'a, 'x> Reader<'a, 'x> {
         if links().any(|name| name == link) {
             return Ok(());
         }
-        let nearest = nearest(link, links());
+        let nearest = most_similar(link, links());
         Err(ModelError::UnknownLink { path: self.path.to_owned(), link: link.to_owned(), nearest })
     }
 

@@ -59,7 +59,7 @@ impl Model {
             let old = reader.origin(node, &format!("joint \"{name}\""))?;
             edits.extend(origin_edits(node, &old, &new, xml));
         }
-        Ok((apply(xml, edits), warnings))
+        Ok((apply_edits(xml, edits), warnings))
     }
 
     /// The origins that calibration changes, by the names of their joints in the URDF: of every moving joint and, with `tip`, of
@@ -138,7 +138,7 @@ fn origin_edits(joint: Node<'_, '_>, old: &Pose, new: &Pose, xml: &str) -> Vec<E
 }
 
 /// Replaces from the end to the beginning, so that earlier positions stay valid.
-fn apply(xml: &str, mut edits: Vec<Edit>) -> String {
+fn apply_edits(xml: &str, mut edits: Vec<Edit>) -> String {
     let mut text = xml.to_owned();
     edits.sort_by_key(|edit| edit.at.start);
     for edit in edits.iter().rev() {

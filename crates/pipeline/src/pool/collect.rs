@@ -46,7 +46,7 @@ struct Found {
 ///
 /// # Errors
 /// A folder without any, a result of another arm, board or setting than the pipeline's.
-pub(super) fn collect(
+pub(super) fn collect_results(
     pipeline: &Pipeline,
     model_text: &str,
     board: Option<&Board>,
@@ -54,20 +54,20 @@ pub(super) fn collect(
 ) -> Result<Collected, PoolError> {
     let facts = board.map(BoardFacts::of);
     let mut found = Vec::new();
-    for result in results(folders)? {
+    for result in result_files(folders)? {
         let past = StoredObservations::open(&result)?;
-        if let Some(problem) = contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
+        if let Some(problem) = find_contradiction(pipeline, &sha256(model_text), facts.as_ref(), &past) {
             let problem = format!("cannot be pooled: {problem}");
             return Err(StoredResultError::Unusable { path: result, problem }.into());
         }
         let recordings = past.recordings.into_iter();
         found.extend(recordings.map(|recording| Found { result: result.clone(), recording }));
     }
-    together(found)
+    merge_recordings(found)
 }
 
 /// All of them in the order of time, each under a name of its own; what two hold counts once.
-fn together(mut found: Vec<Found>) -> Result<Collected, PoolError> {
+fn merge_recordings(mut found: Vec<Found>) -> Result<Collected, PoolError> {
     let mut warnings = Vec::new();
     found.retain(|f| {
         let empty = f.recording.observations.is_empty();
@@ -86,11 +86,11 @@ fn together(mut found: Vec<Found>) -> Result<Collected, PoolError> {
     let mut found = count_once(found, &mut warnings);
     // One that lost its first dwells to another may begin later now.
     found.sort_by_cached_key(|f| (begins_ns(f), f.recording.name.clone(), f.result.clone()));
-    Ok(joined(found, warnings))
+    Ok(assemble_recordings(found, warnings))
 }
 
 /// Gives every recording its name and its place.
-fn joined(found: Vec<Found>, warnings: Vec<Warning>) -> Collected {
+fn assemble_recordings(found: Vec<Found>, warnings: Vec<Warning>) -> Collected {
     let names = unique_names(&found);
     let mut collected = Collected { recordings: Vec::new(), observations: Vec::new(), warnings };
     for (index, (f, name)) in found.into_iter().zip(names).enumerate() {
@@ -120,7 +120,7 @@ fn recording_run(
     board: Option<Pose>,
     observations: &[Observation],
 ) -> RecordingRun {
-    let mut dwells: Vec<Dwell> = observations.iter().map(dwell).collect();
+    let mut dwells: Vec<Dwell> = observations.iter().map(dwell_from_observation).collect();
     dwells.dedup_by_key(|d| d.id);
     let seated = |o: &Observation| {
         let place = match o.cavity() {
@@ -148,7 +148,7 @@ fn recording_run(
 }
 
 /// What an observation tells of its dwell; what it does not is not a number.
-fn dwell(o: &Observation) -> Dwell {
+fn dwell_from_observation(o: &Observation) -> Dwell {
     Dwell {
         id: o.dwell,
         start_ns: o.time_ns,
@@ -171,11 +171,11 @@ fn dwell(o: &Observation) -> Dwell {
 }
 
 /// Every file of observations in the folders and below, each once, in the order of the paths.
-fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, PoolError> {
+fn result_files(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, PoolError> {
     let mut all = BTreeSet::new();
     for folder in folders {
         let mut here = BTreeSet::new();
-        search(folder, &mut here)?;
+        search_folder(folder, &mut here)?;
         if here.is_empty() {
             let problem = "holds no observations.json, in none of its folders: name the results of `armcal run`, and run older ones \
                            again";
@@ -191,7 +191,7 @@ fn results(folders: &[PathBuf]) -> Result<BTreeSet<PathBuf>, PoolError> {
     Ok(all)
 }
 
-fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), PoolError> {
+fn search_folder(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), PoolError> {
     // What is no folder is a result, or is told why it is none by whoever reads it.
     if path.exists() && !path.is_dir() {
         found.insert(path.to_owned());
@@ -202,7 +202,7 @@ fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), PoolError> {
         let entry = entry.map_err(failed)?;
         // A link to a folder may lead in circles.
         if entry.file_type().map_err(failed)?.is_dir() {
-            search(&entry.path(), found)?;
+            search_folder(&entry.path(), found)?;
         } else if entry.file_name() == OBSERVATIONS_FILE {
             found.insert(entry.path());
         }
@@ -211,7 +211,7 @@ fn search(path: &Path, found: &mut BTreeSet<PathBuf>) -> Result<(), PoolError> {
 }
 
 /// What of a result contradicts the pipeline, if anything.
-fn contradiction(
+fn find_contradiction(
     pipeline: &Pipeline,
     model_sha256: &str,
     board: Option<&BoardFacts>,

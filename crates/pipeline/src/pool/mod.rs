@@ -16,8 +16,8 @@ use armcal_core::Pose;
 use armcal_model::{Chain, Frame, Frames, Knowledge, Model, RecordingStart};
 use armcal_result::{Run, Undiagnosed};
 use armcal_stages::joined_tips::place_bases;
-use armcal_stages::{Steps, declare, frames, with_effects};
-use collect::{Collected, CollectedRecording, collect};
+use armcal_stages::{Steps, declare_parameters, frames, with_effects};
+use collect::{Collected, CollectedRecording, collect_results};
 use std::path::PathBuf;
 
 /// Free parameters up to which what is missing is looked for: the search works on all of them at once.
@@ -36,12 +36,16 @@ pub struct Pooled {
 /// # Errors
 /// Results that are missing, or of another arm, board or setting than the pipeline's, each by name; and what can
 /// go wrong in a fit.
-pub fn pool(pipeline: &Pipeline, folders: &[PathBuf], progress: &dyn Steps) -> Result<Pooled, PoolError> {
+pub fn calibrate_jointly(
+    pipeline: &Pipeline,
+    folders: &[PathBuf],
+    progress: &dyn Steps,
+) -> Result<Pooled, PoolError> {
     progress.step("reading results");
     let (model_texts, chain) = frames::nominal_chain(pipeline)?;
-    let board = frames::board(pipeline)?;
-    let collected = collect(pipeline, &model_texts.concat(), board.as_ref(), folders)?;
-    let geometry = geometry(pipeline, chain, &collected)?;
+    let board = frames::read_board(pipeline)?;
+    let collected = collect_results(pipeline, &model_texts.concat(), board.as_ref(), folders)?;
+    let geometry = nominal_geometry(pipeline, chain, &collected)?;
     let effects = frames::effect_specs(pipeline, &geometry)?;
     let observations = collected.observations;
     let model = with_effects(pipeline, &geometry, &effects, &observations)?;
@@ -77,7 +81,7 @@ pub fn pool(pipeline: &Pipeline, folders: &[PathBuf], progress: &dyn Steps) -> R
 }
 
 /// The nominal arm among the frames of all recordings, as one run of them together would have it.
-fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<Model, PoolError> {
+fn nominal_geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<Model, PoolError> {
     let own =
         |r: &CollectedRecording, base_in_world| RecordingStart { name: r.run.name.clone(), base_in_world };
     let recordings = &collected.recordings;
@@ -94,7 +98,9 @@ fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<
     let base = frames::base_frame(&pipeline.frames.base, &bases);
     let knowledge = pipeline.table.as_ref().map_or(Knowledge::Given, |table| match table.pose {
         BoardPose::Estimated => Knowledge::Estimated,
-        BoardPose::Measured | BoardPose::Given => armcal_config::measured(table.sigma_mm, table.sigma_deg),
+        BoardPose::Measured | BoardPose::Given => {
+            armcal_config::pose_knowledge(table.sigma_mm, table.sigma_deg)
+        }
     });
     let board = |r: &CollectedRecording| {
         let name = format!("board.{}", r.run.name);
@@ -103,7 +109,7 @@ fn geometry(pipeline: &Pipeline, chain: Chain, collected: &Collected) -> Result<
     let tip = pipeline.frames.tip.frame("tip", pipeline.fit.use_orientation);
     let boards = recordings.iter().filter_map(board).collect();
     let mut model = Model::new(chain, Frames { base, tip, markers: Vec::new(), boards })?;
-    declare(&mut model, pipeline)?;
+    declare_parameters(&mut model, pipeline)?;
     // Each recording knows its own board alone, so that work grows with their number and no faster.
     let own = recordings.iter().map(|r| own(r, measured.then_some(r.base))).collect();
     model.ask_own(own, pipeline.pool.per_recording.clone());

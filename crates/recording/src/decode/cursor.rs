@@ -160,7 +160,9 @@ impl<'m> Cursor<'m> {
             (Number::Float(8), true) => Some(f64::from_le_bytes(self.primitive()?)),
             (Number::Signed(4), true) => Some(f64::from(i32::from_le_bytes(self.primitive()?))),
             (Number::Unsigned(4), true) => Some(f64::from(u32::from_le_bytes(self.primitive()?))),
-            (_, little_endian) => Some(value(number, little_endian, self.skip_numbers(number.bytes(), 1)?)),
+            (_, little_endian) => {
+                Some(decode_number(number, little_endian, self.skip_numbers(number.bytes(), 1)?))
+            }
         }
     }
 
@@ -180,7 +182,7 @@ impl<'m> Cursor<'m> {
             }
             (_, little_endian) => {
                 let each = bytes.chunks_exact(number.bytes());
-                sink.numbers(slot, each.map(|bytes| value(number, little_endian, bytes)));
+                sink.numbers(slot, each.map(|bytes| decode_number(number, little_endian, bytes)));
             }
         }
         Some(())
@@ -202,7 +204,7 @@ impl<'m> Cursor<'m> {
             }
             (_, little_endian) => {
                 let numbers = bytes.chunks_exact(number.bytes()).enumerate();
-                numbers.for_each(|(k, bytes)| each(k, value(number, little_endian, bytes)));
+                numbers.for_each(|(k, bytes)| each(k, decode_number(number, little_endian, bytes)));
             }
         }
         Some(())
@@ -235,7 +237,7 @@ impl<'m> Cursor<'m> {
 
 /// The number in these bytes, as many as it has. 64-bit integers are rounded to 53 bits.
 #[inline]
-fn value(number: Number, little_endian: bool, bytes: &[u8]) -> f64 {
+fn decode_number(number: Number, little_endian: bool, bytes: &[u8]) -> f64 {
     let bits = match <[u8; 8]>::try_from(bytes) {
         Ok(all) if little_endian => u64::from_le_bytes(all),
         Ok(all) => u64::from_be_bytes(all),

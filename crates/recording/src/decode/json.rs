@@ -131,7 +131,7 @@ impl Code {
     /// Walks one message.
     pub(super) fn run<'m, S: Sink<'m>>(&self, message: &'m Value, sink: &mut S) -> Result<(), DecodeError> {
         let Value::Object(object) = message else {
-            return Err(malformed("the message", "an object", message));
+            return Err(malformed_error("the message", "an object", message));
         };
         for field in &self.fields {
             match object.get(&field.name) {
@@ -141,7 +141,7 @@ impl Code {
                         field.run(element, sink)?;
                     }
                 }
-                Some(other) if field.list => return Err(malformed(&field.name, "an array", other)),
+                Some(other) if field.list => return Err(malformed_error(&field.name, "an array", other)),
                 Some(value) => field.run(value, sink)?,
             }
         }
@@ -160,11 +160,11 @@ impl Property {
             Action::Inside(inside) => inside.run(value, sink)?,
             Action::Value(slot) if slot.is_text() => match value {
                 Value::String(text) => sink.text(*slot, text.as_bytes()),
-                _ => return Err(malformed(&self.name, "a text", value)),
+                _ => return Err(malformed_error(&self.name, "a text", value)),
             },
-            Action::Value(slot) => match number(value) {
+            Action::Value(slot) => match as_number(value) {
                 Some(number) => sink.number(*slot, number),
-                None => return Err(malformed(&self.name, "a number", value)),
+                None => return Err(malformed_error(&self.name, "a number", value)),
             },
         }
         Ok(())
@@ -172,7 +172,7 @@ impl Property {
 }
 
 /// The number a JSON value stands for. `null` in a list is what JSON writers make of NaN.
-fn number(value: &Value) -> Option<f64> {
+fn as_number(value: &Value) -> Option<f64> {
     match value {
         Value::Number(number) => number.as_f64(),
         Value::Bool(flag) => Some(f64::from(u8::from(*flag))),
@@ -182,7 +182,7 @@ fn number(value: &Value) -> Option<f64> {
     }
 }
 
-fn malformed(field: &str, expected: &str, found: &Value) -> DecodeError {
+fn malformed_error(field: &str, expected: &str, found: &Value) -> DecodeError {
     let found = match found {
         Value::Null => "null",
         Value::Bool(_) => "a boolean",
@@ -195,6 +195,6 @@ fn malformed(field: &str, expected: &str, found: &Value) -> DecodeError {
 }
 
 /// Parses the text of one message.
-pub(super) fn message(data: &[u8]) -> Result<Value, DecodeError> {
+pub(super) fn parse_message(data: &[u8]) -> Result<Value, DecodeError> {
     serde_json::from_slice(data).map_err(|e| DecodeError::Malformed { encoding: "json", why: e.to_string() })
 }

@@ -66,7 +66,7 @@ pub fn readable_as(
     message_encoding: &str,
 ) -> Result<Role, DecodeError> {
     let source = [schema_name, schema_encoding, message_encoding];
-    let (shape, ..) = compile(source, schema_data, shapes::recognise)?;
+    let (shape, ..) = compile_schema(source, schema_data, shapes::recognise)?;
     Ok(shape.role)
 }
 
@@ -80,7 +80,7 @@ pub fn fields_for(
     message_encoding: &str,
 ) -> Vec<String> {
     let find = |_: &str, types: &Types| Ok((shapes::quantities_for(types, place), Wanted::default()));
-    compile([schema_name, schema_encoding, message_encoding], schema_data, find)
+    compile_schema([schema_name, schema_encoding, message_encoding], schema_data, find)
         .map_or(Vec::new(), |(fields, ..)| fields)
 }
 
@@ -118,7 +118,7 @@ impl Plan {
         body: Option<&str>,
     ) -> Result<Plan, DecodeError> {
         let source = [schema_name, schema_encoding, message_encoding];
-        let (shape, wanted, code) = compile(source, schema_data, shapes::recognise)?;
+        let (shape, wanted, code) = compile_schema(source, schema_data, shapes::recognise)?;
         if shape.role != role {
             return Err(DecodeError::OtherRole {
                 schema: schema_name.to_owned(),
@@ -153,8 +153,9 @@ impl Plan {
         message_encoding: &str,
         (body, fields): (Option<&str>, &[(Place, &str)]),
     ) -> Result<Plan, DecodeError> {
-        let find = |schema: &str, types: &Types| Ok(((), shapes::at(schema, types, fields)?));
-        let ((), _, code) = compile([schema_name, schema_encoding, message_encoding], schema_data, find)?;
+        let find = |schema: &str, types: &Types| Ok(((), shapes::locate_fields(schema, types, fields)?));
+        let ((), _, code) =
+            compile_schema([schema_name, schema_encoding, message_encoding], schema_data, find)?;
         let body = body.map(|b| b.as_bytes().to_vec());
         Ok(Plan { role, in_millimetres: false, by_place: true, body, every_body: false, code })
     }
@@ -233,7 +234,7 @@ impl Plan {
     /// The parsed text of a JSON message; null for the other encodings.
     fn json_value(&self, data: &[u8]) -> Result<serde_json::Value, DecodeError> {
         match &self.code {
-            Code::Json(_) => json::message(data),
+            Code::Json(_) => json::parse_message(data),
             Code::Binary(_) | Code::Protobuf(_) => Ok(serde_json::Value::Null),
         }
     }
@@ -254,7 +255,7 @@ impl Plan {
 
 /// What `find` makes of the message types of a schema, where its values are, and the code that reads them. The source is the
 /// schema's name and encoding and that of the messages.
-fn compile<T>(
+fn compile_schema<T>(
     [schema, schema_encoding, message_encoding]: [&str; 3],
     data: &[u8],
     find: impl Fn(&str, &Types) -> Result<(T, Wanted), DecodeError>,

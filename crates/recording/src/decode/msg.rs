@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 /// Parses the definitions of `schema` and of all messages it uses.
 pub(super) fn parse(data: &[u8], schema: &str) -> Result<Types, String> {
     let text = std::str::from_utf8(data).map_err(|e| format!("its text is not UTF-8 ({e})"))?;
-    let sections = sections(schema, text)?;
+    let sections = split_sections(schema, text)?;
 
     // Indices are given out when a type is first used, the channel's own message first.
-    let root = canonical(schema);
+    let root = canonical_name(schema);
     let mut used: Vec<&str> = vec![&root];
     let mut index: BTreeMap<&str, usize> = BTreeMap::from([(root.as_str(), 0)]);
     let mut messages = Vec::new();
@@ -26,9 +26,9 @@ pub(super) fn parse(data: &[u8], schema: &str) -> Result<Types, String> {
         for (number, line) in lines {
             let parsed = parse_line(line).map_err(|why| format!("line {number}: {why}"))?;
             let Some((type_name, name_of_field, repeat)) = parsed else { continue };
-            let kind = match builtin(type_name) {
+            let kind = match builtin_kind(type_name) {
                 Some(kind) => kind,
-                None => match resolve(type_name, name, &sections) {
+                None => match resolve_type(type_name, name, &sections) {
                     Resolved::Time => Kind::Time,
                     Resolved::Unknown => {
                         return Err(format!("line {number}: it uses {type_name}, but does not define it"));
@@ -50,9 +50,9 @@ pub(super) fn parse(data: &[u8], schema: &str) -> Result<Types, String> {
 type Lines<'a> = Vec<(usize, &'a str)>;
 
 /// Splits the text into definitions by canonical name.
-fn sections<'a>(schema: &str, text: &'a str) -> Result<BTreeMap<String, Lines<'a>>, String> {
+fn split_sections<'a>(schema: &str, text: &'a str) -> Result<BTreeMap<String, Lines<'a>>, String> {
     let mut sections: BTreeMap<String, Lines<'a>> = BTreeMap::new();
-    let mut name = Some(canonical(schema));
+    let mut name = Some(canonical_name(schema));
     let mut lines: Lines<'a> = Vec::new();
     for (i, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -63,7 +63,7 @@ fn sections<'a>(schema: &str, text: &'a str) -> Result<BTreeMap<String, Lines<'a
             }
         } else if name.is_none() {
             match line.strip_prefix("MSG:") {
-                Some(rest) => name = Some(canonical(rest.trim())),
+                Some(rest) => name = Some(canonical_name(rest.trim())),
                 None if line.is_empty() => {}
                 None => {
                     return Err(format!("line {}: expected `MSG: package/Type` after the separator", i + 1));
@@ -80,7 +80,7 @@ fn sections<'a>(schema: &str, text: &'a str) -> Result<BTreeMap<String, Lines<'a
 }
 
 /// `package/msg/Type` and `package/Type` are the same type.
-fn canonical(name: &str) -> String {
+fn canonical_name(name: &str) -> String {
     name.replacen("/msg/", "/", 1)
 }
 
@@ -92,9 +92,9 @@ enum Resolved<'a> {
 }
 
 /// Finds the definition that `type_name` means inside the definition of `user`.
-fn resolve<'a>(type_name: &str, user: &str, sections: &'a BTreeMap<String, Lines<'_>>) -> Resolved<'a> {
+fn resolve_type<'a>(type_name: &str, user: &str, sections: &'a BTreeMap<String, Lines<'_>>) -> Resolved<'a> {
     let package = user.split_once('/').map_or("", |(package, _)| package);
-    let wanted = canonical(type_name);
+    let wanted = canonical_name(type_name);
     let mut candidates = vec![wanted.clone()];
     if !wanted.contains('/') {
         candidates.insert(0, format!("{package}/{wanted}"));
@@ -165,7 +165,7 @@ fn split_repeat(type_text: &str) -> Result<(&str, Repeat), String> {
 }
 
 /// The primitive types of ROS 1 and ROS 2; `byte` and `char` are one byte in both.
-fn builtin(name: &str) -> Option<Kind> {
+fn builtin_kind(name: &str) -> Option<Kind> {
     Some(match name {
         "bool" | "byte" | "char" | "uint8" => Kind::Number(Number::Unsigned(1)),
         "int8" => Kind::Number(Number::Signed(1)),

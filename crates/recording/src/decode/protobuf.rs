@@ -86,7 +86,7 @@ impl Schema {
                         || field.proto3_optional()
                         || field.oneof_index.is_some();
                     let default = (!is_list(field) && !has_presence).then_some(0.0);
-                    Action::Number { slot: *slot, scalar: scalar(field)?, default }
+                    Action::Number { slot: *slot, scalar: scalar_type(field)?, default }
                 }
                 (Want::Inside(_), _) => return None,
             };
@@ -140,13 +140,13 @@ fn is_message(field: &FieldDescriptorProto) -> bool {
 fn plain_kind(field: &FieldDescriptorProto) -> Kind {
     match field.r#type() {
         Type::String => Kind::Text,
-        _ if scalar(field).is_some() => Kind::Number(Number::Float(8)),
+        _ if scalar_type(field).is_some() => Kind::Number(Number::Float(8)),
         _ => Kind::Other,
     }
 }
 
 /// How a number is written; `None` if the field is none.
-fn scalar(field: &FieldDescriptorProto) -> Option<Scalar> {
+fn scalar_type(field: &FieldDescriptorProto) -> Option<Scalar> {
     // An unknown type, or none, must not pass for the first of the enumeration.
     let kind = Type::try_from(field.r#type?).ok()?;
     Some(match kind {
@@ -192,21 +192,25 @@ enum Action {
 impl Code {
     /// Walks one message.
     pub(super) fn run<'m, S: Sink<'m>>(&self, data: &'m [u8], sink: &mut S) -> Result<(), DecodeError> {
-        walk(&self.main, data, sink)
+        decode_fields(&self.main, data, sink)
     }
 }
 
-fn walk<'m, S: Sink<'m>>(fields: &[TagField], data: &'m [u8], sink: &mut S) -> Result<(), DecodeError> {
+fn decode_fields<'m, S: Sink<'m>>(
+    fields: &[TagField],
+    data: &'m [u8],
+    sink: &mut S,
+) -> Result<(), DecodeError> {
     let mut reader = Reader::new(data);
     while let Some((tag, value)) = reader.next_field()? {
         let Some(field) = fields.iter().find(|field| field.tag == tag) else { continue };
         match (&field.action, value) {
             (Action::Message(inside), Value::Bytes(bytes)) if field.list => {
                 sink.begin_item();
-                walk(inside, bytes, sink)?;
+                decode_fields(inside, bytes, sink)?;
                 sink.end_item();
             }
-            (Action::Message(inside), Value::Bytes(bytes)) => walk(inside, bytes, sink)?,
+            (Action::Message(inside), Value::Bytes(bytes)) => decode_fields(inside, bytes, sink)?,
             (Action::Text(slot), Value::Bytes(bytes)) => sink.text(*slot, bytes),
             (Action::Number { slot, scalar, .. }, Value::Bytes(packed)) if field.list => {
                 let mut packed = Reader::new(packed);

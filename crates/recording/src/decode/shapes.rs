@@ -5,7 +5,7 @@
 use super::slot::Slot;
 use super::types::{Field, Kind, Number, Repeat, Types};
 use super::{DecodeError, Role};
-use crate::error::nearest;
+use crate::error::nearest_name;
 
 /// A message shape: the fields it must and may have, beside a stamp and of poses a frame, which any may have.
 pub(super) struct Shape {
@@ -43,73 +43,73 @@ enum Part {
 }
 use Part::{Frame, Point, Quaternion, Stamp, Value};
 
-const fn joints(parts: &'static [(Need, &'static str, Part)]) -> Shape {
+const fn joint_shape(parts: &'static [(Need, &'static str, Part)]) -> Shape {
     Shape { role: Role::Joints, in_millimetres: false, by_place: false, stamped: "", parts }
 }
 
 /// Poses of which the message at `stamped` has stamp and frame.
-const fn poses(stamped: &'static str, parts: &'static [(Need, &'static str, Part)]) -> Shape {
+const fn stamped_pose_shape(stamped: &'static str, parts: &'static [(Need, &'static str, Part)]) -> Shape {
     Shape { role: Role::Pose, in_millimetres: false, by_place: false, stamped, parts }
 }
 
-const fn pose(parts: &'static [(Need, &'static str, Part)]) -> Shape {
-    poses("", parts)
+const fn pose_shape(parts: &'static [(Need, &'static str, Part)]) -> Shape {
+    stamped_pose_shape("", parts)
 }
 
-const fn scalar(parts: &'static [(Need, &'static str, Part)]) -> Shape {
+const fn scalar_shape(parts: &'static [(Need, &'static str, Part)]) -> Shape {
     Shape { role: Role::Scalar, in_millimetres: false, by_place: false, stamped: "", parts }
 }
 
 /// Every shape armcal reads.
 pub(super) static SHAPES: &[Shape] = &[
     // sensor_msgs/JointState
-    joints(&[
+    joint_shape(&[
         (Must, "name[]", Value(Slot::Joint)),
         (Must, "position[]", Value(Slot::Position)),
         (May, "effort[]", Value(Slot::Effort)),
     ]),
     // foxglove.JointStates
-    joints(&[
+    joint_shape(&[
         (Must, "joints[].name", Value(Slot::Joint)),
         (Must, "joints[].position", Value(Slot::Position)),
         (May, "joints[].effort", Value(Slot::Effort)),
     ]),
     // control_msgs/DynamicJointState
-    joints(&[
+    joint_shape(&[
         (Must, "joint_names[]", Value(Slot::Joint)),
         (Must, "interface_values[].interface_names[]", Value(Slot::Interface)),
         (Must, "interface_values[].values[]", Value(Slot::InterfaceValue)),
     ]),
     // control_msgs/JointTrajectoryControllerState since 2023
-    joints(&[
+    joint_shape(&[
         (Must, "joint_names[]", Value(Slot::Joint)),
         (Must, "feedback.positions[]", Value(Slot::Position)),
         (May, "feedback.effort[]", Value(Slot::Effort)),
     ]),
     // control_msgs/JointTrajectoryControllerState before, and in ROS 1
-    joints(&[
+    joint_shape(&[
         (Must, "joint_names[]", Value(Slot::Joint)),
         (Must, "actual.positions[]", Value(Slot::Position)),
         (May, "actual.effort[]", Value(Slot::Effort)),
     ]),
     // geometry_msgs/PoseStamped, foxglove.PoseInFrame
-    pose(&[(Must, "pose.position", Point), (Must, "pose.orientation", Quaternion)]),
+    pose_shape(&[(Must, "pose.position", Point), (Must, "pose.orientation", Quaternion)]),
     // geometry_msgs/PoseWithCovarianceStamped, nav_msgs/Odometry
-    pose(&[
+    pose_shape(&[
         (Must, "pose.pose.position", Point),
         (Must, "pose.pose.orientation", Quaternion),
         (May, "child_frame_id", Value(Slot::Body)),
     ]),
     // geometry_msgs/PointStamped, foxglove.Point3InFrame
-    pose(&[(Must, "point", Point)]),
+    pose_shape(&[(Must, "point", Point)]),
     // geometry_msgs/TransformStamped
-    pose(&[
+    pose_shape(&[
         (Must, "transform.translation", Point),
         (Must, "transform.rotation", Quaternion),
         (Must, "child_frame_id", Value(Slot::Body)),
     ]),
     // tf2_msgs/TFMessage
-    poses(
+    stamped_pose_shape(
         "transforms[]",
         &[
             (Must, "transforms[].transform.translation", Point),
@@ -118,13 +118,13 @@ pub(super) static SHAPES: &[Shape] = &[
         ],
     ),
     // foxglove.FrameTransform
-    pose(&[
+    pose_shape(&[
         (Must, "translation", Point),
         (Must, "rotation", Quaternion),
         (Must, "child_frame_id", Value(Slot::Body)),
     ]),
     // foxglove.FrameTransforms
-    poses(
+    stamped_pose_shape(
         "transforms[]",
         &[
             (Must, "transforms[].translation", Point),
@@ -133,13 +133,13 @@ pub(super) static SHAPES: &[Shape] = &[
         ],
     ),
     // mocap4r2_msgs/RigidBodies, mocap_msgs/RigidBodies. The header of the list is the one its drivers fill.
-    pose(&[
+    pose_shape(&[
         (Must, "rigidbodies[].pose.position", Point),
         (Must, "rigidbodies[].pose.orientation", Quaternion),
         (Must, "rigidbodies[].rigid_body_name", Value(Slot::Body)),
     ]),
     // motion_capture_tracking_interfaces/NamedPoseArray
-    pose(&[
+    pose_shape(&[
         (Must, "poses[].pose.position", Point),
         (Must, "poses[].pose.orientation", Quaternion),
         (Must, "poses[].name", Value(Slot::Body)),
@@ -153,7 +153,7 @@ pub(super) static SHAPES: &[Shape] = &[
         parts: &[(Must, "poses[].position", Point), (Must, "poses[].orientation", Quaternion)],
     },
     // geometry_msgs/Pose
-    pose(&[(Must, "position", Point), (Must, "orientation", Quaternion)]),
+    pose_shape(&[(Must, "position", Point), (Must, "orientation", Quaternion)]),
     // vicon_bridge/Markers passes the millimetres of the Vicon SDK on
     // (vicon_bridge.cpp publishes `GetMarkerGlobalTranslation` unscaled).
     Shape {
@@ -169,13 +169,13 @@ pub(super) static SHAPES: &[Shape] = &[
         ],
     },
     // mocap4r2_msgs/Markers
-    pose(&[
+    pose_shape(&[
         (Must, "markers[].translation", Point),
         (Must, "markers[].marker_name", Value(Slot::Body)),
         (May, "markers[].marker_index", Value(Slot::BodyIndex)),
     ]),
     // mocap_msgs/Markers of 2021, numbered only
-    pose(&[(Must, "markers[].translation", Point), (Must, "markers[].index", Value(Slot::BodyIndex))]),
+    pose_shape(&[(Must, "markers[].translation", Point), (Must, "markers[].index", Value(Slot::BodyIndex))]),
     // vicon_receiver/Position (before version 1), millimetres of the Vicon SDK
     Shape {
         role: Role::Pose,
@@ -195,9 +195,9 @@ pub(super) static SHAPES: &[Shape] = &[
         ],
     },
     // sensor_msgs/Temperature
-    scalar(&[(Must, "temperature", Value(Slot::Value))]),
+    scalar_shape(&[(Must, "temperature", Value(Slot::Value))]),
     // std_msgs/Float64 and its relatives
-    scalar(&[(Must, "data", Value(Slot::Value))]),
+    scalar_shape(&[(Must, "data", Value(Slot::Value))]),
 ];
 
 /// The fields to read out of a message, in the order of their definition.
@@ -272,7 +272,11 @@ impl Place {
 }
 
 /// Where the values at these paths are, and the stamp and frame that belong to them.
-pub(super) fn at(schema: &str, types: &Types, fields: &[(Place, &str)]) -> Result<Wanted, DecodeError> {
+pub(super) fn locate_fields(
+    schema: &str,
+    types: &Types,
+    fields: &[(Place, &str)],
+) -> Result<Wanted, DecodeError> {
     let mut wanted = Wanted::default();
     for &(place, path) in fields {
         let found = match path.strip_suffix('*').filter(|inside| inside.is_empty() || inside.ends_with('.')) {
@@ -287,7 +291,7 @@ pub(super) fn at(schema: &str, types: &Types, fields: &[(Place, &str)]) -> Resul
                 schema: schema.to_owned(),
                 path: path.to_owned(),
                 needs: place.needs(),
-                nearest: nearest(path, &present),
+                nearest: nearest_name(path, &present),
                 present,
             });
         }
@@ -302,7 +306,7 @@ pub(super) fn at(schema: &str, types: &Types, fields: &[(Place, &str)]) -> Resul
 /// Adds every field of the message at `inside` that fits, in the order of its definition.
 fn add_all(types: &Types, wanted: &mut Wanted, inside: &str, part: Part) -> bool {
     let mut found = false;
-    for path in paths(types, part, |_| true) {
+    for path in readable_paths(types, part, |_| true) {
         let name = path.strip_prefix(inside);
         found |= name.is_some_and(|name| !name.contains(['.', '['])) && part.add(types, wanted, &path);
     }
@@ -314,7 +318,7 @@ const MOST_PATHS: usize = 1000;
 const DEEPEST: usize = 8;
 
 /// The paths at which a part can be read.
-fn paths(types: &Types, part: Part, is_wanted: fn(&Field) -> bool) -> Vec<String> {
+fn readable_paths(types: &Types, part: Part, is_wanted: fn(&Field) -> bool) -> Vec<String> {
     let mut found = Vec::new();
     let mut open = vec![(String::new(), 0, 0)];
     while let Some((inside, message, depth)) = open.pop() {
@@ -343,7 +347,7 @@ fn paths(types: &Types, part: Part, is_wanted: fn(&Field) -> bool) -> Vec<String
 
 /// The paths at which a message of these types has what a place needs, in fields that are wanted.
 fn fields_for(types: &Types, place: Place, is_wanted: fn(&Field) -> bool) -> Vec<String> {
-    let mut found = paths(types, place.part(), is_wanted);
+    let mut found = readable_paths(types, place.part(), is_wanted);
     found.retain(|path| place != Place::Value || !path.contains('['));
     found
 }
@@ -426,7 +430,7 @@ fn add_value(types: &Types, wanted: &mut Wanted, path: &str, slot: Slot) -> bool
         }
         match (field.kind, segments.peek()) {
             (Kind::Message(inner), Some(_)) => message = inner,
-            (_, None) if fits(field, slot) => {}
+            (_, None) if fits_slot(field, slot) => {}
             _ => return false,
         }
         steps.push(index);
@@ -436,7 +440,7 @@ fn add_value(types: &Types, wanted: &mut Wanted, path: &str, slot: Slot) -> bool
 }
 
 /// Whether the values of a field can go into a slot.
-fn fits(field: &Field, slot: Slot) -> bool {
+fn fits_slot(field: &Field, slot: Slot) -> bool {
     match field.kind {
         Kind::Number(_) => !slot.is_text() && slot != Slot::Time,
         Kind::Text => slot.is_text(),

@@ -94,7 +94,7 @@ impl<'m> Reader<'m> {
         let key = self.varint()?;
         match u32::try_from(key >> 3) {
             Ok(tag) if tag != 0 => Ok((tag, (key & 7) as u8)),
-            _ => Err(malformed(format!("field number {} at byte {}", key >> 3, self.at()))),
+            _ => Err(malformed_error(format!("field number {} at byte {}", key >> 3, self.at()))),
         }
     }
 
@@ -111,7 +111,7 @@ impl<'m> Reader<'m> {
                 Value::Bytes(bytes)
             }
             5 => Value::Fixed32(self.fixed()?),
-            _ => return Err(malformed(format!("wire type {wire_type} at byte {}", self.at()))),
+            _ => return Err(malformed_error(format!("wire type {wire_type} at byte {}", self.at()))),
         })
     }
 
@@ -121,7 +121,9 @@ impl<'m> Reader<'m> {
         while let Some(&innermost) = open.last() {
             match self.key()? {
                 (inner, 3) if open.len() < MAX_GROUPS => open.push(inner),
-                (_, 3) => return Err(malformed(format!("groups nested deeper than {MAX_GROUPS} levels"))),
+                (_, 3) => {
+                    return Err(malformed_error(format!("groups nested deeper than {MAX_GROUPS} levels")));
+                }
                 (end, 4) if end == innermost => _ = open.pop(),
                 (_, wire_type) => _ = self.value(wire_type)?,
             }
@@ -139,7 +141,7 @@ impl<'m> Reader<'m> {
                 return Ok(value);
             }
         }
-        Err(malformed(format!("a varint longer than 10 bytes before byte {}", self.at())))
+        Err(malformed_error(format!("a varint longer than 10 bytes before byte {}", self.at())))
     }
 
     fn fixed<const N: usize>(&mut self) -> Result<[u8; N], DecodeError> {
@@ -159,6 +161,6 @@ impl<'m> Reader<'m> {
 }
 
 #[cold]
-fn malformed(why: String) -> DecodeError {
+fn malformed_error(why: String) -> DecodeError {
     DecodeError::Malformed { encoding: "protobuf", why }
 }

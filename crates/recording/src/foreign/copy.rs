@@ -1,7 +1,7 @@
 //! The MCAP file that messages of another format are copied into.
 
 use super::Converted;
-use super::inflate::inflated;
+use super::inflate::inflate_message;
 use crate::RecordingError;
 use crate::budget::Allowance;
 use crate::damage::{Damage, Faults};
@@ -40,7 +40,7 @@ impl Copy {
             .chunk_size(Some(CHUNK_BYTES))
             .calculate_chunk_crcs(false)
             .calculate_data_section_crc(false);
-        let writer = options.create(BufWriter::new(file)).map_err(|e| failed(path, e))?;
+        let writer = options.create(BufWriter::new(file)).map_err(|e| copy_error(path, e))?;
         Ok(Copy { path: path.to_owned(), writer, faults: Faults::default(), broken: None })
     }
 
@@ -66,7 +66,7 @@ impl Copy {
             None => Ok(0),
         };
         let id = schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, &BTreeMap::new()));
-        id.map_err(|e| failed(&self.path, e))
+        id.map_err(|e| copy_error(&self.path, e))
     }
 
     /// Adds a message, inflated if it is compressed by itself.
@@ -78,10 +78,10 @@ impl Copy {
         data: &[u8],
         allowance: &Allowance,
     ) -> Result<(), RecordingError> {
-        match inflated(data, allowance) {
+        match inflate_message(data, allowance) {
             Ok(data) => {
                 let header = MessageHeader { channel_id, sequence, log_time: time_ns, publish_time: time_ns };
-                self.writer.write_to_known_channel(&header, &data).map_err(|e| failed(&self.path, e))
+                self.writer.write_to_known_channel(&header, &data).map_err(|e| copy_error(&self.path, e))
             }
             Err(_) if allowance.is_exceeded() => Err(allowance.exceeded(&self.path)),
             Err(why) => {
@@ -97,7 +97,7 @@ impl Copy {
             self.lost(format!("{messages} compressed messages cannot be used, the first because {why}"));
         }
         let Copy { path, mut writer, faults, .. } = self;
-        writer.finish().map_err(|e| failed(&path, e))?;
+        writer.finish().map_err(|e| copy_error(&path, e))?;
         let file = writer.into_inner().into_inner().map_err(|e| no_room(&path)(e.into_error()))?;
         let mut map = Map::of(&file).map_err(no_room(&path))?;
         // The identity is that of the original.
@@ -112,7 +112,7 @@ pub(super) fn no_room(path: &Path) -> impl Fn(io::Error) -> RecordingError {
     move |source| RecordingError::Copy { path: path.to_owned(), source }
 }
 
-fn failed(path: &Path, error: mcap::McapError) -> RecordingError {
+fn copy_error(path: &Path, error: mcap::McapError) -> RecordingError {
     match error {
         mcap::McapError::Io(source) => RecordingError::Copy { path: path.to_owned(), source },
         // What the system refuses is this to the library, with its reason behind it.

@@ -3,7 +3,7 @@
 
 use super::copy::Copy;
 use super::wal::Frames;
-use crate::layout::mixed;
+use crate::layout::hash_pair;
 use crate::{RecordingError, shortened};
 use rusqlite::ffi::{self, SQLITE_IOERR, SQLITE_IOERR_SHORT_READ};
 use rusqlite::{Connection, Error, ErrorCode};
@@ -25,15 +25,19 @@ pub(super) fn is_of_disk(error: &Error) -> bool {
     error.sqlite_error_code().is_some_and(|code| failures.contains(&code))
 }
 
-pub(super) fn failed(path: &Path, error: Error) -> RecordingError {
+pub(super) fn read_error(path: &Path, error: Error) -> RecordingError {
     RecordingError::Read { path: path.to_owned(), source: std::io::Error::other(error) }
 }
 
 /// Damage of the database is noted, a failure of the disk is an error.
-fn noted<T>(result: rusqlite::Result<T>, copy: &mut Copy, what: &str) -> Result<Option<T>, RecordingError> {
+fn tolerate_damage<T>(
+    result: rusqlite::Result<T>,
+    copy: &mut Copy,
+    what: &str,
+) -> Result<Option<T>, RecordingError> {
     match result {
         Ok(value) => Ok(Some(value)),
-        Err(e) if is_of_disk(&e) => Err(failed(copy.path(), e)),
+        Err(e) if is_of_disk(&e) => Err(read_error(copy.path(), e)),
         Err(e) => {
             copy.lost(format!("{what} ({e})"));
             Ok(None)
@@ -44,7 +48,7 @@ fn noted<T>(result: rusqlite::Result<T>, copy: &mut Copy, what: &str) -> Result<
 /// SQLite's own look at its pages.
 pub(super) fn quick_check(database: &Connection, copy: &mut Copy) -> Result<(), RecordingError> {
     let said = database.query_row("PRAGMA quick_check(1)", [], |row| row.get::<_, String>(0));
-    let said = noted(said, copy, "the database is damaged")?;
+    let said = tolerate_damage(said, copy, "the database is damaged")?;
     if let Some(said) = said.filter(|said| said != "ok") {
         // A page that the disk refuses is told like one that is damaged, by the number of its error; the end of a file that is
         // too short has one too.
@@ -52,7 +56,7 @@ pub(super) fn quick_check(database: &Connection, copy: &mut Copy) -> Result<(), 
         if let Some(code) =
             code.filter(|code| code & 0xff == SQLITE_IOERR && *code != SQLITE_IOERR_SHORT_READ)
         {
-            return Err(failed(copy.path(), Error::SqliteFailure(ffi::Error::new(code), None)));
+            return Err(read_error(copy.path(), Error::SqliteFailure(ffi::Error::new(code), None)));
         }
         let words: Vec<&str> = said.split_whitespace().collect();
         copy.lost(format!(
@@ -71,7 +75,10 @@ pub(super) fn compare_log(
     copy: &mut Copy,
 ) -> Result<(), RecordingError> {
     let taken = database.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |row| row.get::<_, i64>(1));
-    let taken = noted(taken, copy, "its write-ahead log cannot be read")?.unwrap_or(0).max(0).cast_unsigned();
+    let taken = tolerate_damage(taken, copy, "its write-ahead log cannot be read")?
+        .unwrap_or(0)
+        .max(0)
+        .cast_unsigned();
     match frames {
         None => copy.lost("its write-ahead log does not begin as one, and nothing of it is used".to_owned()),
         Some(frames) if frames.written != taken => copy.lost(format!(
@@ -106,13 +113,13 @@ impl Stored {
         self.rows += 1;
         let [low, high] = self.numbers.unwrap_or([number; 2]);
         self.numbers = Some([low.min(number), high.max(number)]);
-        self.mixed = self.mixed.wrapping_add(entry(number, time_ns));
+        self.mixed = self.mixed.wrapping_add(row_hash(number, time_ns));
         self.bytes += bytes as u64 + LEAST_ROW_BYTES;
     }
 }
 
-fn entry(number: i64, time_ns: Option<i64>) -> u64 {
-    mixed(time_ns.map_or(u64::MAX, i64::cast_unsigned), number.cast_unsigned())
+fn row_hash(number: i64, time_ns: Option<i64>) -> u64 {
+    hash_pair(time_ns.map_or(u64::MAX, i64::cast_unsigned), number.cast_unsigned())
 }
 
 /// Rows that are no messages, and numbers that are left out: a recorder counts from 1 on and takes none back.
@@ -146,7 +153,7 @@ pub(super) fn compare_index(
     let damaged = "the index of its messages cannot be read";
     let name = match database.query_row(of_times, [], |row| row.get::<_, String>(0)) {
         Err(Error::QueryReturnedNoRows) => return Ok(()),
-        name => noted(name, copy, damaged)?,
+        name => tolerate_damage(name, copy, damaged)?,
     };
     let Some(name) = name else { return Ok(()) };
     let sum = || -> rusqlite::Result<(u64, u64)> {
@@ -156,7 +163,7 @@ pub(super) fn compare_index(
         let (mut rows, mut found) = (statement.query([])?, (0, 0_u64));
         while let Some(row) = rows.next()? {
             found.0 += 1;
-            found.1 = found.1.wrapping_add(entry(row.get(1)?, row.get_ref(0)?.as_i64().ok()));
+            found.1 = found.1.wrapping_add(row_hash(row.get(1)?, row.get_ref(0)?.as_i64().ok()));
             // Pages that refer to each other could give entries without end.
             if found.0 > stored.rows {
                 break;
@@ -164,7 +171,7 @@ pub(super) fn compare_index(
         }
         Ok(found)
     };
-    let found = noted(sum(), copy, damaged)?;
+    let found = tolerate_damage(sum(), copy, damaged)?;
     if found.is_some_and(|found| found != (stored.rows, stored.mixed)) {
         copy.lost(format!(
             "the index of its messages lists others than the {} messages that are there, or at other times",

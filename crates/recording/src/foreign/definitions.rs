@@ -52,17 +52,17 @@ pub(crate) const TYPES: &[(&str, &str)] = &[
 
 /// The definition of a message type, such as `sensor_msgs/msg/JointState`, with all that it uses, in the `ros2msg` format
 /// of MCAP; `None` if the type is not known here.
-pub(crate) fn of(name: &str) -> Option<String> {
+pub(crate) fn full_text(name: &str) -> Option<String> {
     let root = name.replacen("/msg/", "/", 1);
-    let mut text = own(&root)?.to_owned();
+    let mut text = own_text(&root)?.to_owned();
     let mut used = vec![root];
     let mut at = 0;
     while at < used.len() {
         let package = used[at].split_once('/').map_or("", |(package, _)| package).to_owned();
-        for line in own(&used[at]).unwrap_or_default().lines() {
+        for line in own_text(&used[at]).unwrap_or_default().lines() {
             let kind = line.split([' ', '[']).next().unwrap_or_default();
             let full = if kind.contains('/') { kind.to_owned() } else { format!("{package}/{kind}") };
-            if let Some(definition) = own(&full).filter(|_| !used.contains(&full)) {
+            if let Some(definition) = own_text(&full).filter(|_| !used.contains(&full)) {
                 text += &format!("{}\nMSG: {full}\n{definition}", "=".repeat(80));
                 used.push(full);
             }
@@ -72,6 +72,6 @@ pub(crate) fn of(name: &str) -> Option<String> {
     Some(text)
 }
 
-fn own(name: &str) -> Option<&'static str> {
+fn own_text(name: &str) -> Option<&'static str> {
     TYPES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }

@@ -20,7 +20,7 @@ const BUFFER_BYTES: usize = 1 << 20;
 const STEP_BYTES: u64 = 64 << 10;
 
 /// Inflates a file into another. What ends or goes wrong on the way is damage; all before it is there.
-pub(super) fn whole(
+pub(super) fn to_file(
     map: &Map,
     path: &Path,
     to: &mut File,
@@ -50,7 +50,7 @@ pub(super) fn whole(
 ///
 /// # Errors
 /// What is compressed is damaged or too large, in words.
-pub fn inflated<'a>(data: &'a [u8], allowance: &Allowance) -> Result<Cow<'a, [u8]>, String> {
+pub fn inflate_message<'a>(data: &'a [u8], allowance: &Allowance) -> Result<Cow<'a, [u8]>, String> {
     if !data.starts_with(&MAGIC) {
         return Ok(data.into());
     }

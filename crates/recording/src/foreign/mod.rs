@@ -19,8 +19,8 @@ mod wal;
 
 pub(crate) use copy::DEFINITION_FROM;
 #[cfg(test)]
-pub(crate) use definitions::{TYPES as KNOWN_TYPES, of as definition_of};
-pub use inflate::inflated;
+pub(crate) use definitions::{TYPES as KNOWN_TYPES, full_text as definition_of};
+pub use inflate::inflate_message;
 pub(crate) use wal::{identity as log_identity, logs_of};
 
 use crate::budget::Allowance;
@@ -57,7 +57,7 @@ enum Kind {
 /// So many bytes tell what a file is.
 const HEAD_BYTES: usize = 16;
 
-fn kind(head: &[u8]) -> Option<Kind> {
+fn kind_of_head(head: &[u8]) -> Option<Kind> {
     match head {
         b if b.starts_with(mcap::MAGIC) => Some(Kind::Mcap),
         b if b.starts_with(b"SQLite format 3\0") => Some(Kind::Database),
@@ -67,7 +67,7 @@ fn kind(head: &[u8]) -> Option<Kind> {
 }
 
 fn kind_of(bytes: &FileBytes) -> Result<Option<Kind>, RecordingError> {
-    Ok(kind(&bytes.read(0..HEAD_BYTES.min(bytes.len() as usize))?))
+    Ok(kind_of_head(&bytes.read(0..HEAD_BYTES.min(bytes.len() as usize))?))
 }
 
 /// Whether a file is a database, which a log may stand beside.
@@ -90,9 +90,9 @@ pub(crate) fn convert(
             FileBytes::Ranged(object) if url::is_url(path) => {
                 let mut file = tempfile::NamedTempFile::new().map_err(no_room(path))?;
                 object.each_round(&mut |piece| file.write_all(piece).map_err(no_room(path)))?;
-                database(file.path(), path, allowance).map(Some)
+                convert_database(file.path(), path, allowance).map(Some)
             }
-            _ => database(path, path, allowance).map(Some),
+            _ => convert_database(path, path, allowance).map(Some),
         },
         Some(Kind::Mcap) | None => Ok(None),
     }
@@ -102,14 +102,14 @@ pub(crate) fn convert(
 fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
     let mut named = tempfile::NamedTempFile::new().map_err(no_room(path))?;
     let damage: Vec<Damage> =
-        inflate::whole(map, path, named.as_file_mut(), allowance)?.into_iter().collect();
+        inflate::to_file(map, path, named.as_file_mut(), allowance)?.into_iter().collect();
     let mut head = Vec::new();
     let mut reread = File::open(named.path()).map_err(no_room(path))?;
     std::io::Read::by_ref(&mut reread)
         .take(HEAD_BYTES as u64)
         .read_to_end(&mut head)
         .map_err(no_room(path))?;
-    match kind(&head) {
+    match kind_of_head(&head) {
         Some(Kind::Mcap) => {
             let mut map = Map::of(named.as_file()).map_err(no_room(path))?;
             // The identity is that of the original.
@@ -117,7 +117,7 @@ fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, 
             Ok(Converted { map, damage, log: String::new(), known_here: None })
         }
         Some(Kind::Database) => {
-            let mut converted = database(named.path(), path, allowance)?;
+            let mut converted = convert_database(named.path(), path, allowance)?;
             converted.damage.splice(0..0, damage);
             Ok(converted)
         }
@@ -131,7 +131,7 @@ fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, 
 }
 
 /// The messages of the rosbag2 database `file`, which is or was made of `path`.
-fn database(file: &Path, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
+fn convert_database(file: &Path, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
     let mut copy = Copy::create(path)?;
     let (log, known_here) = rosbag2::read(file, &mut copy, allowance)?;
     copy.finish(log, known_here)

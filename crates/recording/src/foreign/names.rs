@@ -7,12 +7,12 @@ const ENDINGS: [&str; 6] = [".mcap", ".mcap.zst", ".mcap.zstd", ".db3", ".db3.zs
 
 /// Whether a file is a recording, by its name.
 pub fn is_recording(path: &Path) -> bool {
-    ending(path).is_some()
+    recording_ending(path).is_some()
 }
 
 /// A path without the ending that makes it a recording, or without its extension.
 pub fn without_ending(path: &Path) -> PathBuf {
-    match (path.file_name().and_then(|name| name.to_str()), ending(path)) {
+    match (path.file_name().and_then(|name| name.to_str()), recording_ending(path)) {
         (Some(name), Some(ending)) => path.with_file_name(&name[..name.len() - ending.len()]),
         _ => path.with_extension(""),
     }
@@ -38,7 +38,7 @@ pub fn files_of(paths: &[PathBuf]) -> Vec<PathBuf> {
     paths.iter().flat_map(of).collect()
 }
 
-fn ending(path: &Path) -> Option<&'static str> {
+fn recording_ending(path: &Path) -> Option<&'static str> {
     let name = path.file_name()?.to_str()?;
     ENDINGS.into_iter().find(|ending| name.len() > ending.len() && name.ends_with(ending))
 }

@@ -5,9 +5,11 @@
 //! a journal, both are copied, and the copy is opened.
 
 use super::copy::{Copy, no_room};
-use super::database::{Stored, compare_index, compare_log, compare_rows, failed, is_of_disk, quick_check};
+use super::database::{
+    Stored, compare_index, compare_log, compare_rows, is_of_disk, quick_check, read_error,
+};
 use super::definitions;
-use super::wal::{Frames, beside, frames, identity, logs_of};
+use super::wal::{Frames, count_frames, identity, logs_of, path_beside};
 use crate::budget::{Allowance, FREE_VARIABLE, most_definition_bytes};
 use crate::{RecordingError, input};
 use rusqlite::config::DbConfig;
@@ -31,30 +33,30 @@ pub(super) fn read(
     allowance: &Allowance,
 ) -> Result<(String, BTreeSet<String>), RecordingError> {
     let refused = |path: &Path, why: String| RecordingError::Foreign { path: path.to_owned(), why };
-    let with_pending = pending(file)?;
+    let with_pending = copy_with_logs(file)?;
     let opened = match &with_pending {
         Some(Pending { copied, .. }) => {
             Connection::open_with_flags(copied, OpenFlags::SQLITE_OPEN_READ_WRITE)
         }
         None => {
             let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
-            Connection::open_with_flags(immutable(file), flags)
+            Connection::open_with_flags(immutable_uri(file), flags)
         }
     };
     let path = copy.path().to_owned();
     let unreadable = |e: Error| match is_of_disk(&e) {
-        true => failed(&path, e),
+        true => read_error(&path, e),
         false => refused(&path, format!("it is an SQLite database that cannot be read ({e})")),
     };
     let database = opened.map_err(unreadable)?;
     let bytes = bytes_of_all(file);
-    harden(&database, bytes).map_err(unreadable)?;
+    harden_connection(&database, bytes).map_err(unreadable)?;
     let is_corrupt = |e: &Error| e.sqlite_error_code() == Some(ErrorCode::DatabaseCorrupt);
-    let (tables, corrupt) = match tables(&database) {
+    let (tables, corrupt) = match stored_tables(&database) {
         Err(e) if is_corrupt(&e) => {
             // SQLite then reads what there is of a database that is shorter than its header says.
             database.set_db_config(DbConfig::SQLITE_DBCONFIG_WRITABLE_SCHEMA, true).map_err(unreadable)?;
-            (tables(&database), Some(e))
+            (stored_tables(&database), Some(e))
         }
         tables => (tables, None),
     };
@@ -89,7 +91,7 @@ pub(super) fn read(
 }
 
 /// Nothing in a database is trusted: no functions in its schema, no values longer than the file.
-fn harden(database: &Connection, bytes: u64) -> rusqlite::Result<()> {
+fn harden_connection(database: &Connection, bytes: u64) -> rusqlite::Result<()> {
     let longest = i32::try_from(bytes.clamp(LEAST_VALUE_BYTES, MAX_VALUE_BYTES)).unwrap_or(i32::MAX);
     database.set_db_config(DbConfig::SQLITE_DBCONFIG_TRUSTED_SCHEMA, false)?;
     database.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_VIEW, false)?;
@@ -99,7 +101,7 @@ fn harden(database: &Connection, bytes: u64) -> rusqlite::Result<()> {
 }
 
 /// The tables whose columns are all stored.
-fn tables(database: &Connection) -> rusqlite::Result<BTreeSet<String>> {
+fn stored_tables(database: &Connection) -> rusqlite::Result<BTreeSet<String>> {
     let mut statement = database.prepare(
         "SELECT name FROM sqlite_schema WHERE type = 'table' AND sql LIKE 'CREATE TABLE%' \
          AND NOT EXISTS (SELECT 1 FROM pragma_table_xinfo(sqlite_schema.name) WHERE hidden <> 0)",
@@ -133,7 +135,7 @@ fn add_topics(
             }
             let stored = of_bag.get(&kind).map(|(encoding, text)| (encoding.as_str(), text.as_str().into()));
             let readable = stored.as_ref().is_some_and(|(encoding, _)| *encoding == "ros2msg");
-            let known = if readable { None } else { definitions::of(&kind) };
+            let known = if readable { None } else { definitions::full_text(&kind) };
             if known.is_some() {
                 known_here.insert(kind.clone());
             }
@@ -148,7 +150,7 @@ fn add_topics(
     match topics() {
         Ok(()) => Ok((channels, known_here)),
         Err(Stop::Failed(e)) => Err(e),
-        Err(Stop::Damaged(e)) if is_of_disk(&e) => Err(failed(&path, e)),
+        Err(Stop::Damaged(e)) if is_of_disk(&e) => Err(read_error(&path, e)),
         Err(Stop::Damaged(e)) => refused(format!(
             "its topics cannot be read ({e}); `sqlite3 IN .recover | sqlite3 OUT` may save it"
         )),
@@ -213,7 +215,7 @@ fn copy_messages(
     };
     match pass() {
         Ok(()) => {}
-        Err(Stop::Damaged(e)) if is_of_disk(&e) => return Err(failed(copy.path(), e)),
+        Err(Stop::Damaged(e)) if is_of_disk(&e) => return Err(read_error(copy.path(), e)),
         Err(Stop::Damaged(e)) => copy.lost(format!(
             "the database is damaged ({e}) and read up to its message {}; `sqlite3 IN .recover | sqlite3 OUT` \
              may save more",
@@ -254,7 +256,7 @@ struct Pending {
 }
 
 /// Copies both, if there is anything that is not in the database yet.
-fn pending(file: &Path) -> Result<Option<Pending>, RecordingError> {
+fn copy_with_logs(file: &Path) -> Result<Option<Pending>, RecordingError> {
     let logs = logs_of(file);
     if logs.is_empty() {
         return Ok(None);
@@ -264,13 +266,13 @@ fn pending(file: &Path) -> Result<Option<Pending>, RecordingError> {
     let copied = folder.path().join("bag.db3");
     std::fs::copy(file, &copied).map_err(&failed)?;
     for (ending, log) in &logs {
-        input::note(log);
-        std::fs::copy(log, beside(&copied, ending)).map_err(&failed)?;
+        input::register_path(log);
+        std::fs::copy(log, path_beside(&copied, ending)).map_err(&failed)?;
     }
     // Of the copies, which nobody writes on.
     let identity = identity(&copied)?;
     let wal = logs.iter().any(|(ending, _)| *ending == "-wal");
-    let frames = if wal { frames(&beside(&copied, "-wal")).map_err(&failed)? } else { None };
+    let frames = if wal { count_frames(&path_beside(&copied, "-wal")).map_err(&failed)? } else { None };
     Ok(Some(Pending { copied, identity, wal, frames, _folder: folder }))
 }
 
@@ -281,7 +283,7 @@ fn bytes_of_all(file: &Path) -> u64 {
 }
 
 /// A path as a URI by which SQLite opens a file that nobody changes.
-fn immutable(file: &Path) -> String {
+fn immutable_uri(file: &Path) -> String {
     let mut uri = "file:".to_owned();
     for &byte in file.as_os_str().as_encoded_bytes() {
         match byte {

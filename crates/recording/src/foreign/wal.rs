@@ -1,6 +1,6 @@
 //! The files beside a database that hold what SQLite has not put into it yet: a write-ahead log or a journal.
 
-use crate::identity::named;
+use crate::identity::prefixed_hash;
 use crate::{RecordingError, input};
 use std::ffi::OsString;
 use std::fs::File;
@@ -15,12 +15,12 @@ const FRAME_BYTES: usize = 24;
 
 /// Those of a database that are there and hold anything, with their endings.
 pub(crate) fn logs_of(database: &Path) -> Vec<(&'static str, PathBuf)> {
-    let beside = |ending: &'static str| (ending, beside(database, ending));
+    let beside = |ending: &'static str| (ending, path_beside(database, ending));
     let all = ENDINGS.into_iter().map(beside);
     all.filter(|(_, path)| std::fs::metadata(path).is_ok_and(|about| about.len() > 0)).collect()
 }
 
-pub(super) fn beside(file: &Path, ending: &str) -> PathBuf {
+pub(super) fn path_beside(file: &Path, ending: &str) -> PathBuf {
     let mut name = OsString::from(file);
     name.push(ending);
     PathBuf::from(name)
@@ -33,7 +33,7 @@ pub(crate) fn identity(database: &Path) -> Result<String, RecordingError> {
         let mut hasher = blake3::Hasher::new();
         let read = input::open(&path).and_then(|file| hasher.update_reader(file).map(|_| ()));
         read.map_err(|source| RecordingError::Read { path, source })?;
-        all += &format!("+{}:{}", &ending[1..], named(hasher.finalize()));
+        all += &format!("+{}:{}", &ending[1..], prefixed_hash(hasher.finalize()));
     }
     Ok(all)
 }
@@ -48,7 +48,7 @@ pub(super) struct Frames {
 }
 
 /// Counts the pages; `None` where the file does not begin as a log does.
-pub(super) fn frames(log: &Path) -> io::Result<Option<Frames>> {
+pub(super) fn count_frames(log: &Path) -> io::Result<Option<Frames>> {
     let mut file = File::open(log)?;
     let mut header = [0; HEADER_BYTES];
     if file.read_exact(&mut header).is_err() {

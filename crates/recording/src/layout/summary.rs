@@ -1,6 +1,6 @@
 //! The summary, the footer and the end of a file, as witnesses of what its data section should hold.
 
-use super::{Block, FIRST_PRIVATE, Layout, Places, Walk, Walked, body, is_footer};
+use super::{Block, FIRST_PRIVATE, Layout, Places, Walk, Walked, body_range, is_footer};
 use crate::records::{ChunkHeader, ChunkIndex, Cursor, ENVELOPE, RawRecord, Records, Statistics};
 use crate::report::Source;
 use mcap::records::op;
@@ -50,7 +50,7 @@ impl Layout {
             match record {
                 Ok(record) if record.op == op::FOOTER && is_footer(walk.bytes, &record) => {
                     self.use_summary(walk, start, &record);
-                    return self.check_end(walk.bytes, body(&record).end);
+                    return self.check_end(walk.bytes, body_range(&record).end);
                 }
                 Ok(record) if !of_summary(record.op) => self.faults.lost(record.offset, || {
                     format!("a record of kind {:#04x} after the end of the data; it is not read", record.op)
@@ -71,7 +71,7 @@ impl Layout {
         let start = Cursor::new(footer.body).u64().and_then(|start| usize::try_from(start).ok());
         let start = start.filter(|start| (mcap::MAGIC.len()..footer.offset).contains(start));
         self.use_summary(walk, start.unwrap_or(footer.offset), footer);
-        self.check_end(walk.bytes, body(footer).end);
+        self.check_end(walk.bytes, body_range(footer).end);
     }
 
     /// The footer's CRC covers the summary and the footer up to the CRC itself (MCAP specification, "Footer").

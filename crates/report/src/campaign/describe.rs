@@ -1,9 +1,9 @@
 //! A change in words.
 
-use super::date::minute;
+use super::date::utc_minute;
 use armcal_campaign::{Change, ChangeKind, ErrorFigures, Row, Status};
-use armcal_core::units::millimetres;
-use armcal_core::{Unit, printable};
+use armcal_core::units::format_mm;
+use armcal_core::{Unit, printable_name};
 use armcal_result::{Campaign, Repeat};
 use armcal_wording::in_display_unit;
 
@@ -12,37 +12,42 @@ const MONTH_DAYS: f64 = 30.0;
 
 /// Start of a recording, mean errors before and after [mm], or `none` where there are none, and a status that is not good.
 pub(super) fn cells(row: &Row, none: &str) -> [String; 4] {
-    let mean = |errors: &ErrorFigures| errors.mean_m.map_or(none.to_owned(), millimetres);
+    let mean = |errors: &ErrorFigures| errors.mean_m.map_or(none.to_owned(), format_mm);
     let flag = if row.status == Status::Ok { "" } else { row.status.word() };
-    [minute(row.start_ns), mean(&row.nominal), mean(&row.calibrated), flag.to_owned()]
+    [utc_minute(row.start_ns), mean(&row.nominal), mean(&row.calibrated), flag.to_owned()]
 }
 
 /// What, by how much, between which recordings.
-pub(super) fn sentence(campaign: &Campaign, change: &Change) -> String {
+pub(super) fn change_sentence(campaign: &Campaign, change: &Change) -> String {
     let row = |row: usize| {
         let row = &campaign.rows[row];
-        format!("`{}` ({})", printable(&row.recording), minute(row.start_ns))
+        format!("`{}` ({})", printable_name(&row.recording), utc_minute(row.start_ns))
     };
-    let name = printable(&change.quantity);
+    let name = printable_name(&change.quantity);
     match change.kind {
         ChangeKind::Step { before, after } => {
             let own = campaign.rows[after].quantities.iter().find(|q| *q.name == *change.quantity);
             let more = if own.is_some_and(|q| q.at_bound) { ", to its bound or beyond," } else { "" };
-            format!("{name} steps by {}{more} between {} and {}", size(change, 1.0), row(before), row(after))
+            format!(
+                "{name} steps by {}{more} between {} and {}",
+                change_size_text(change, 1.0),
+                row(before),
+                row(after)
+            )
         }
         ChangeKind::Outlier { at } => {
-            format!("{name} is off by {} in {} alone", size(change, 1.0), row(at))
+            format!("{name} is off by {} in {} alone", change_size_text(change, 1.0), row(at))
         }
         ChangeKind::Trend { from, to } => {
-            let month = size(change, MONTH_DAYS);
+            let month = change_size_text(change, MONTH_DAYS);
             format!("{name} changes by {month} a month ({MONTH_DAYS} days) from {} to {}", row(from), row(to))
         }
     }
 }
 
 /// What two recordings have in common, and what follows.
-pub(super) fn repeated(campaign: &Campaign, repeat: &Repeat) -> String {
-    let name = |row: usize| printable(&campaign.rows[row].recording);
+pub(super) fn repeat_sentence(campaign: &Campaign, repeat: &Repeat) -> String {
+    let name = |row: usize| printable_name(&campaign.rows[row].recording);
     let (own, other, Repeat { dwells, all, .. }) = (name(repeat.row), name(repeat.of), repeat);
     let follows = if repeat.counts_once() {
         "it counts once, as the other"
@@ -53,7 +58,7 @@ pub(super) fn repeated(campaign: &Campaign, repeat: &Repeat) -> String {
 }
 
 /// What a change of this quantity usually is.
-pub(super) fn meaning(change: &Change) -> Option<&'static str> {
+pub(super) fn change_meaning(change: &Change) -> Option<&'static str> {
     let (name, step) = (change.quantity.as_str(), matches!(change.kind, ChangeKind::Step { .. }));
     match () {
         () if name.starts_with("board_in_base.") && step => Some("table or robot bumped, or set up anew"),
@@ -69,14 +74,14 @@ pub(super) fn meaning(change: &Change) -> Option<&'static str> {
 }
 
 /// Signed, with the half width of its interval, in the unit for people.
-fn size(change: &Change, times: f64) -> String {
-    let (value, symbol) = shown(change.unit, change.size * times);
-    let half = change.ci95.map(|[low, high]| shown(change.unit, 0.5 * (high - low) * times).0);
+fn change_size_text(change: &Change, times: f64) -> String {
+    let (value, symbol) = value_and_symbol(change.unit, change.size * times);
+    let half = change.ci95.map(|[low, high]| value_and_symbol(change.unit, 0.5 * (high - low) * times).0);
     let sign = if change.size > 0.0 { "+" } else { "" };
     let half = half.map_or(String::new(), |half| format!(" ± {half}"));
     format!("{sign}{value}{half} {symbol}").trim_end().to_owned()
 }
 
-fn shown(unit: Unit, si: f64) -> (String, &'static str) {
+fn value_and_symbol(unit: Unit, si: f64) -> (String, &'static str) {
     (in_display_unit(unit, si), unit.display_symbol())
 }

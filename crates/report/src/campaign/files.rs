@@ -1,11 +1,11 @@
 //! A campaign for programs, and its page.
 
-use super::describe::{meaning, repeated, sentence};
+use super::describe::{change_meaning, change_sentence, repeat_sentence};
 use super::page::CampaignPage;
-use super::story::conclusion;
+use super::story::campaign_conclusion;
 use crate::ReportError;
 use crate::tables::Columns;
-use crate::write::{commit_all, stage, stage_pieces};
+use crate::write::{commit_all, stage_file, stage_pieces};
 use armcal_campaign::{Change, Row};
 use armcal_core::Unit;
 use armcal_result::{Campaign, FailedRecording, Repeat, Status, VERSION};
@@ -63,13 +63,17 @@ pub fn campaign_json(campaign: &Campaign) -> String {
 
 impl<'a> File<'a> {
     fn of(campaign: &'a Campaign) -> File<'a> {
-        let told = |change| Told { change, sentence: sentence(campaign, change), meaning: meaning(change) };
+        let told = |change| Told {
+            change,
+            sentence: change_sentence(campaign, change),
+            meaning: change_meaning(change),
+        };
         File {
             schema: SCHEMA,
             version: VERSION,
             pipeline: &campaign.pipeline,
             status: campaign.status(),
-            conclusion: conclusion(campaign),
+            conclusion: campaign_conclusion(campaign),
             recordings: campaign
                 .rows
                 .iter()
@@ -83,7 +87,7 @@ impl<'a> File<'a> {
                 .map(|repeat| Repeated {
                     repeat,
                     counts_once: repeat.counts_once(),
-                    sentence: repeated(campaign, repeat),
+                    sentence: repeat_sentence(campaign, repeat),
                 })
                 .collect(),
             changes: campaign.changes.iter().map(told).collect(),
@@ -99,7 +103,7 @@ impl<'a> File<'a> {
 pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let [html, json, parquet] = campaign_files(folder);
     // What takes most memory comes before anything else is held.
-    let table = columns(campaign).encode("campaign.parquet")?;
+    let table = campaign_columns(campaign).encode("campaign.parquet")?;
     let staged = vec![
         {
             let page = CampaignPage::of(campaign)?;
@@ -109,7 +113,7 @@ pub fn write_campaign(campaign: &Campaign, folder: &Path) -> Result<Vec<PathBuf>
             serde_json::to_writer_pretty(&mut *out, &File::of(campaign))?;
             out.write_all(b"\n")
         })?,
-        stage(&parquet, &table)?,
+        stage_file(&parquet, &table)?,
     ];
     commit_all(staged)
 }
@@ -119,7 +123,7 @@ pub fn campaign_files(folder: &Path) -> [PathBuf; 3] {
     ["campaign.html", "campaign.json", "campaign.parquet"].map(|name| folder.join(name))
 }
 
-fn columns(campaign: &Campaign) -> Columns {
+fn campaign_columns(campaign: &Campaign) -> Columns {
     let rows = &campaign.rows;
     let number = |f: fn(&Row) -> Option<f64>| rows.iter().map(f);
     let mut c = Columns::default();
@@ -144,12 +148,12 @@ fn columns(campaign: &Campaign) -> Columns {
     let missing: Vec<String> = rows.iter().map(|r| r.missing.join("+")).collect();
     c.text("missing", missing.iter().map(|m| Some(m.as_str())));
     c.integer("warnings", rows.iter().map(|r| r.warnings.len() as i64));
-    quantities(&mut c, rows);
+    add_quantity_columns(&mut c, rows);
     c
 }
 
 /// Every quantity that a row has, determined or not, in the order of first appearance.
-fn quantities(c: &mut Columns, rows: &[Row]) {
+fn add_quantity_columns(c: &mut Columns, rows: &[Row]) {
     let mut names: Vec<(&str, Unit)> = Vec::new();
     let mut known = std::collections::BTreeSet::new();
     for q in rows.iter().flat_map(|r| &r.quantities) {

@@ -1,6 +1,6 @@
 //! The page of a campaign: errors over time, every change with its series, every recording.
 
-use super::describe::{self, meaning, repeated, sentence};
+use super::describe::{self, change_meaning, change_sentence, repeat_sentence};
 use super::story::campaign_story;
 use crate::ReportError;
 use crate::page::embed;
@@ -34,27 +34,30 @@ impl<'a> CampaignPage<'a> {
         let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/campaign.js")];
         let name = &campaign.pipeline;
         let names = (format!("{name}, campaign"), format!("{name} · every recording calibrated by itself"));
-        let shell = Shell::new("campaign-page", names, &scripts, &document(campaign))?;
+        let shell = Shell::new("campaign-page", names, &scripts, &campaign_document(campaign))?;
         let story = campaign_story(campaign);
-        let told = campaign.changes.iter().map(|c| (sentence(campaign, c), meaning(c).unwrap_or_default()));
+        let told = campaign
+            .changes
+            .iter()
+            .map(|c| (change_sentence(campaign, c), change_meaning(c).unwrap_or_default()));
         Ok(CampaignPage {
             shell: shell.telling(&story),
             next: story.next,
             changes: told.collect(),
             rows: campaign.rows.iter().zip(&campaign.folders).collect(),
             failed: &campaign.failed,
-            repeats: campaign.repeats.iter().map(|r| repeated(campaign, r)).collect(),
+            repeats: campaign.repeats.iter().map(|r| repeat_sentence(campaign, r)).collect(),
             warnings: story.warnings,
         })
     }
 }
 
 /// What the page's script draws: errors of every recording [mm] and quantities in their display units, by time.
-fn document(campaign: &Campaign) -> Value {
+fn campaign_document(campaign: &Campaign) -> Value {
     let rows = &campaign.rows;
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.sort_by_key(|i| (rows[*i].start_ns, *i));
-    let order = thinned(order);
+    let order = thin_evenly(order);
     let mm = |f: fn(&Row) -> Option<f64>| -> Vec<Option<f64>> {
         order.iter().map(|i| f(&rows[*i]).map(|m| m * 1e3)).collect()
     };
@@ -71,13 +74,13 @@ fn document(campaign: &Campaign) -> Value {
             "after": mm(|r| r.calibrated.mean_m),
             "floor": mm(|r| Some(r.noise_floor_m).filter(|m| m.is_finite())),
         },
-        "curves": series.into_iter().map(|s| curve(campaign, s)).collect::<Value>(),
+        "curves": series.into_iter().map(|s| curve_json(campaign, s)).collect::<Value>(),
     })
 }
 
-fn curve(campaign: &Campaign, series: &Series) -> Value {
+fn curve_json(campaign: &Campaign, series: &Series) -> Value {
     use armcal_campaign::ChangeKind::{Outlier, Step, Trend};
-    let points = thinned(series.points.clone());
+    let points = thin_evenly(series.points.clone());
     let own = campaign.changes.iter().filter(|c| c.quantity == series.quantity);
     let marks = own.filter_map(|c| match c.kind {
         Step { after, .. } => Some(after),
@@ -98,7 +101,7 @@ fn curve(campaign: &Campaign, series: &Series) -> Value {
     })
 }
 
-fn thinned<T>(all: Vec<T>) -> Vec<T> {
+fn thin_evenly<T>(all: Vec<T>) -> Vec<T> {
     let stride = all.len().div_ceil(MOST_POINTS).max(1);
     all.into_iter().step_by(stride).collect()
 }

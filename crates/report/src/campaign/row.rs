@@ -18,7 +18,7 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
     let overall = run.overall_warnings();
     let mut warnings: Vec<&Warning> = recording.all_warnings().into_iter().chain(&overall).collect();
     warnings.sort_by_key(|w| std::cmp::Reverse(w.severity));
-    let tilt = words(tilt);
+    let tilt = tilt_text(tilt);
     Some(Row {
         recording: recording.name.clone(),
         paths: recording.paths.iter().map(|p| p.to_string_lossy().into_owned()).collect(),
@@ -31,19 +31,19 @@ pub fn campaign_row(run: &Run, tilt: Tilt, load_kg: f64) -> Option<Row> {
         associated: run.associated(recording),
         rejected: recording.rejections.len(),
         status: run.status(),
-        nominal: figures(&judged.nominal),
-        calibrated: figures(&judged.fitted),
+        nominal: error_figures(&judged.nominal),
+        calibrated: error_figures(&judged.fitted),
         noise_floor_m: calibration.noise_floor_m,
         verdict: answer(run).sentence,
-        missing: missing(run),
+        missing: missing_effects(run),
         warnings: warnings.iter().map(|w| run.in_words(&w.to_string())).collect(),
         severities: warnings.iter().map(|w| w.severity.word().to_owned()).collect(),
-        quantities: quantities(run, &judged.fitted, &tilt),
+        quantities: run_quantities(run, &judged.fitted, &tilt),
         tilt,
     })
 }
 
-fn words(tilt: Tilt) -> String {
+fn tilt_text(tilt: Tilt) -> String {
     let parts = [("roll", tilt.roll_rad), ("pitch", tilt.pitch_rad)];
     let tilted = parts.iter().filter(|(_, angle_rad)| *angle_rad != 0.0);
     let words: Vec<String> =
@@ -55,7 +55,7 @@ fn without_zeros(text: String) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-fn figures(stats: &ErrorStats) -> ErrorFigures {
+fn error_figures(stats: &ErrorStats) -> ErrorFigures {
     let some = |value_m: f64| Some(value_m).filter(|v| stats.n > 0 && v.is_finite());
     ErrorFigures {
         n: stats.n,
@@ -66,13 +66,13 @@ fn figures(stats: &ErrorStats) -> ErrorFigures {
     }
 }
 
-fn missing(run: &Run) -> Vec<String> {
+fn missing_effects(run: &Run) -> Vec<String> {
     let Some(diagnosis) = &run.diagnosis else { return Vec::new() };
     let found = diagnosis.suggested(run.model.chain().joint_names()).unwrap_or_default();
     found.iter().map(ToString::to_string).collect()
 }
 
-fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
+fn run_quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
     let known = |name: String, unit, value| Quantity {
         name: name.into(),
         unit,
@@ -83,7 +83,8 @@ fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
     };
     let calibration = &run.calibration;
     let own = |e: &&Estimate| e.parameter.free && !e.parameter.name.starts_with("board.");
-    let mut all: Vec<Quantity> = calibration.fit.estimates.iter().filter(own).map(parameter).collect();
+    let mut all: Vec<Quantity> =
+        calibration.fit.estimates.iter().filter(own).map(parameter_quantity).collect();
     let p = calibration.fit.values();
     if let Some(board) = run.model.board_in_world(&p, 0) {
         let pose = RollPitchYaw::from(&(run.model.base_in_world(&p).inverse() * board));
@@ -105,7 +106,7 @@ fn quantities(run: &Run, errors: &ErrorStats, tilt: &str) -> Vec<Quantity> {
     all
 }
 
-fn parameter(e: &Estimate) -> Quantity {
+fn parameter_quantity(e: &Estimate) -> Quantity {
     Quantity {
         name: e.parameter.name.as_str().into(),
         unit: e.parameter.unit,

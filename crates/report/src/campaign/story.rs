@@ -1,9 +1,9 @@
 //! What a campaign comes to: how many, how well, what is wrong, what to do next.
 
-use super::describe::{meaning, sentence};
+use super::describe::{change_meaning, change_sentence};
 use armcal_campaign::{ErrorFigures, Row, Status};
-use armcal_core::units::millimetres;
-use armcal_core::{Severity, listed, printable};
+use armcal_core::units::format_mm;
+use armcal_core::{Severity, list_names, printable_name};
 use armcal_result::Campaign;
 use armcal_wording::{Story, ToldWarning};
 use std::cmp::Reverse;
@@ -11,25 +11,25 @@ use std::collections::BTreeMap;
 
 /// The end of a campaign.
 pub(super) fn campaign_story(campaign: &Campaign) -> Story {
-    let wrong = wrong(campaign);
+    let wrong = problem_summary(campaign);
     let wrong = (!wrong.is_empty()).then(|| format!("{}.", wrong.join("; ")));
     Story::undiagnosed(
-        conclusion(campaign),
+        campaign_conclusion(campaign),
         wrong.into_iter().collect(),
         campaign.status(),
-        next(campaign),
-        warnings(campaign),
+        next_steps(campaign),
+        grave_warnings(campaign),
     )
 }
 
 /// What it comes to, in one sentence.
-pub(super) fn conclusion(campaign: &Campaign) -> String {
+pub(super) fn campaign_conclusion(campaign: &Campaign) -> String {
     let (done, failed) = (campaign.rows.len(), campaign.failed.len());
     let of = done + failed;
     let median = |of: fn(&Row) -> &ErrorFigures| {
         let mut means: Vec<f64> = campaign.counted().filter_map(|r| of(r).mean_m).collect();
         means.sort_by(f64::total_cmp);
-        means.get(means.len() / 2).map(|m| millimetres(*m))
+        means.get(means.len() / 2).map(|m| format_mm(*m))
     };
     let errors = match (median(|r| &r.nominal), median(|r| &r.calibrated)) {
         (Some(before), Some(after)) => format!(": mean error {before} mm before, {after} mm after (median)"),
@@ -49,7 +49,7 @@ pub(super) fn conclusion(campaign: &Campaign) -> String {
 }
 
 /// How many are doubtful, and what is named in them.
-fn wrong(campaign: &Campaign) -> Vec<String> {
+fn problem_summary(campaign: &Campaign) -> Vec<String> {
     let count = |status| campaign.rows.iter().filter(|row| row.status == status).count();
     let told = [
         (campaign.failed.len(), "not calibrated at all"),
@@ -58,18 +58,20 @@ fn wrong(campaign: &Campaign) -> Vec<String> {
     ];
     let all = campaign.rows.len() + campaign.failed.len();
     let doubtful = told.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} of {all} {what}"));
-    let named = missing(campaign).into_iter().map(|(name, n)| format!("{name} missing in {n} of {all}"));
+    let named = missing_effect_counts(campaign)
+        .into_iter()
+        .map(|(name, n)| format!("{name} missing in {n} of {all}"));
     doubtful.chain(named.take(1)).collect()
 }
 
 /// What the diagnosis names, and in how many recordings, the most frequent first. Moments differ from recording to recording
 /// and are left away.
-fn missing(campaign: &Campaign) -> Vec<(String, usize)> {
+fn missing_effect_counts(campaign: &Campaign) -> Vec<(String, usize)> {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for row in campaign.counted() {
         let kinds = row.missing.iter().map(|name| name.split('@').next().unwrap_or(name).to_owned());
         kinds.collect::<std::collections::BTreeSet<_>>().into_iter().for_each(|kind| {
-            *counts.entry(printable(&kind)).or_default() += 1;
+            *counts.entry(printable_name(&kind)).or_default() += 1;
         });
     }
     let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
@@ -77,7 +79,7 @@ fn missing(campaign: &Campaign) -> Vec<(String, usize)> {
     counts
 }
 
-fn next(campaign: &Campaign) -> Vec<String> {
+fn next_steps(campaign: &Campaign) -> Vec<String> {
     let failed = campaign.failed.first().map(|f| {
         let more = match campaign.failed.len() {
             1 => String::new(),
@@ -85,8 +87,8 @@ fn next(campaign: &Campaign) -> Vec<String> {
         };
         format!(
             "mend what keeps `{}` from being calibrated{more}: {}",
-            printable(&f.recording),
-            printable(&f.why)
+            printable_name(&f.recording),
+            printable_name(&f.why)
         )
     });
     let worst = (campaign.rows.iter().zip(&campaign.folders))
@@ -96,19 +98,19 @@ fn next(campaign: &Campaign) -> Vec<String> {
     let worst = worst.map(|(row, folder, mean_m)| {
         format!(
             "look at `{}` first, which errs most of the doubtful ones ({} mm): its warnings are below, and in `{}`",
-            printable(&row.recording),
-            millimetres(mean_m),
-            printable(&format!("{folder}/summary.json"))
+            printable_name(&row.recording),
+            format_mm(mean_m),
+            printable_name(&format!("{folder}/summary.json"))
         )
     });
     // An event is no part of the arm: there is nothing to add for other recordings.
     let lasting = |name: &str| campaign.rows.iter().flat_map(|row| &row.missing).any(|m| m == name);
-    let effect = missing(campaign).into_iter().find(|(name, n)| *n > 1 && lasting(name)).map(|(name, n)| {
+    let effect = missing_effect_counts(campaign).into_iter().find(|(name, n)| *n > 1 && lasting(name)).map(|(name, n)| {
         format!("`armcal add {name} PIPELINE` adds what {n} recordings name; run the campaign again with what it writes")
     });
     let change = campaign.changes.first().map(|c| {
-        let meaning = meaning(c).map_or(String::new(), |meaning| format!(" ({meaning}?)"));
-        format!("find out what changed: {}{meaning}", sentence(campaign, c))
+        let meaning = change_meaning(c).map_or(String::new(), |meaning| format!(" ({meaning}?)"));
+        format!("find out what changed: {}{meaning}", change_sentence(campaign, c))
     });
     let steps: Vec<String> = [failed, worst, effect, change].into_iter().flatten().collect();
     if steps.is_empty() && campaign.status() == Status::Ok && campaign.rows.len() > 1 {
@@ -119,21 +121,25 @@ fn next(campaign: &Campaign) -> Vec<String> {
 
 /// What keeps recordings from being calibrated or relied upon, what several have once, the gravest first. Notices are left to
 /// the results of each.
-fn warnings(campaign: &Campaign) -> Vec<ToldWarning> {
+fn grave_warnings(campaign: &Campaign) -> Vec<ToldWarning> {
     let mut all: BTreeMap<(Reverse<Severity>, &str), Vec<String>> = BTreeMap::new();
     for f in &campaign.failed {
-        all.entry((Reverse(Severity::DataLost), &f.why)).or_default().push(printable(&f.recording));
+        all.entry((Reverse(Severity::DataLost), &f.why)).or_default().push(printable_name(&f.recording));
     }
     for row in &campaign.rows {
         for (text, severity) in row.warnings.iter().zip(&row.severities) {
             let grave = [Severity::Inadequate, Severity::DataLost].into_iter().find(|s| s.word() == severity);
             if let Some(severity) = grave {
-                all.entry((Reverse(severity), text)).or_default().push(printable(&row.recording));
+                all.entry((Reverse(severity), text)).or_default().push(printable_name(&row.recording));
             }
         }
     }
-    let told = |((Reverse(severity), text), recordings): ((Reverse<Severity>, &str), Vec<String>)| {
-        ToldWarning { severity, code: String::new(), subject: listed(&recordings), message: printable(text) }
-    };
+    let told =
+        |((Reverse(severity), text), recordings): ((Reverse<Severity>, &str), Vec<String>)| ToldWarning {
+            severity,
+            code: String::new(),
+            subject: list_names(&recordings),
+            message: printable_name(text),
+        };
     all.into_iter().map(told).collect()
 }

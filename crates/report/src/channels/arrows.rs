@@ -1,7 +1,7 @@
 //! Error arrows, exaggerated by a stated factor and coloured by size; one topic a model, to be switched on and off.
 
 use super::scene::places_m;
-use super::shapes::{Rgba, arrow, entity, label, note};
+use super::shapes::{Rgba, arrow, key_value, label, scene_entity};
 use super::{Messages, start_ns, timestamp};
 use armcal_result::analysis::round_factor;
 use armcal_result::{Point, Run};
@@ -52,18 +52,22 @@ pub(super) fn put(run: &Run, recording: usize, own: &[&Point], drawing: &Drawing
         sets.push((AFTER, drawing.fitted_factor));
     }
     for ((topic, id, error), factor) in sets {
-        let mut entity = entity(id, time_ns);
-        entity.metadata.push(note("exaggeration", factor));
+        let mut entity = scene_entity(id, time_ns);
+        entity.metadata.push(key_value("exaggeration", factor));
         entity.arrows.extend(own.iter().filter_map(|p| {
             let (measured_m, error_m) = error(p);
             arrow(&measured_m, &(error_m * factor), THICKNESS_M, drawing.ramp(error_m.norm()))
         }));
-        out.put(topic, time_ns, &fox::SceneUpdate { deletions: vec![all(time_ns)], entities: vec![entity] });
+        out.put(
+            topic,
+            time_ns,
+            &fox::SceneUpdate { deletions: vec![delete_all(time_ns)], entities: vec![entity] },
+        );
     }
 }
 
 /// Everything that the topic has drawn so far goes.
-pub(super) fn all(time_ns: i64) -> fox::SceneEntityDeletion {
+pub(super) fn delete_all(time_ns: i64) -> fox::SceneEntityDeletion {
     fox::SceneEntityDeletion {
         timestamp: Some(timestamp(time_ns)),
         r#type: fox::scene_entity_deletion::Type::All as i32,
@@ -102,10 +106,10 @@ impl Drawing {
              green {} mm, red {} mm and more",
             self.nominal_factor,
             self.fitted_factor,
-            armcal_core::units::millimetres(self.small_m),
-            armcal_core::units::millimetres(self.large_m)
+            armcal_core::units::format_mm(self.small_m),
+            armcal_core::units::format_mm(self.large_m)
         );
-        let mut legend = entity("scale", time_ns);
+        let mut legend = scene_entity("scale", time_ns);
         legend.texts.push(label(&self.legend_m?, INK, words));
         Some(legend)
     }

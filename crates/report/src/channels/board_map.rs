@@ -4,11 +4,11 @@
 use super::arrows::ramp;
 use super::board_grid::{Grid, PANEL};
 use super::board_scale::Scale;
-use super::shapes::{Rgba, arrow, disc, entity, note, text};
+use super::shapes::{Rgba, arrow, billboard_text, disc, key_value, scene_entity};
 use super::{Messages, run_start_ns};
 use crate::findings::Findings;
 use armcal_core::robust::percentile;
-use armcal_core::{Pose, printable};
+use armcal_core::{Pose, printable_name};
 use armcal_result::Run;
 use armcal_result::proto::BoardErrors;
 use foxglove::messages as fox;
@@ -37,16 +37,16 @@ struct Vectors<'a> {
 pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
     let Some(first) = findings.boards.first() else { return };
     let time_ns = run_start_ns(run);
-    let grid = grid(findings);
+    let grid = map_grid(findings);
     let (_, [width_m, height_m]) = grid.middle_and_size_m();
     let titles: Vec<String> =
-        findings.boards.iter().flat_map(|b| rows(b).into_iter().map(|v| title(b, &v))).collect();
+        findings.boards.iter().flat_map(|b| vector_rows(b).into_iter().map(|v| board_title(b, &v))).collect();
     let scale = Scale::of(run, findings, width_m.max(PANEL * height_m), (&titles, &grid));
     let words = scale.words(first.magnification);
     let mut entities = Vec::new();
     for (index, board) in findings.boards.iter().enumerate() {
-        for (row, vectors) in rows(board).into_iter().enumerate() {
-            entities.push(map(
+        for (row, vectors) in vector_rows(board).into_iter().enumerate() {
+            entities.push(map_entity(
                 board,
                 &vectors,
                 (&grid.centre_m(index, row), &grid.title_m(index, row)),
@@ -55,8 +55,8 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
             ));
         }
     }
-    let mut legend = entity("scale", time_ns);
-    legend.texts.push(text(&grid.legend_m(), scale.text_m, INK, words));
+    let mut legend = scene_entity("scale", time_ns);
+    legend.texts.push(billboard_text(&grid.legend_m(), scale.text_m, INK, words));
     entities.push(legend);
     for entity in &mut entities {
         entity.frame_id = FRAME.into();
@@ -66,11 +66,11 @@ pub(super) fn put(run: &Run, findings: &Findings, out: &mut Messages) {
 
 /// Middle of the map, and its width and height [m], for a camera that shows all of it.
 pub(crate) fn middle_and_size_m(findings: &Findings) -> ([f64; 3], [f64; 2]) {
-    grid(findings).middle_and_size_m()
+    map_grid(findings).middle_and_size_m()
 }
 
-fn grid(findings: &Findings) -> Grid {
-    let each = findings.boards.first().map_or(1, |b| rows(b).len());
+fn map_grid(findings: &Findings) -> Grid {
+    let each = findings.boards.first().map_or(1, |b| vector_rows(b).len());
     Grid::of(findings.boards.len(), each, extent_m(findings))
 }
 
@@ -81,7 +81,7 @@ fn extent_m(findings: &Findings) -> Vector2<f64> {
         let mut ends = Vec::new();
         for board in &findings.boards {
             most = place(board).iter().fold(most, |most, x| most.max(x.abs()));
-            for vectors in rows(board) {
+            for vectors in vector_rows(board) {
                 let end = |(x, e): (&f64, &f64)| (x + e * board.magnification).abs();
                 ends.extend(place(board).iter().zip(error(&vectors)).map(end));
             }
@@ -92,7 +92,7 @@ fn extent_m(findings: &Findings) -> Vector2<f64> {
     Vector2::new(x, y) * 2e-3
 }
 
-fn rows(b: &BoardErrors) -> Vec<Vectors<'_>> {
+fn vector_rows(b: &BoardErrors) -> Vec<Vectors<'_>> {
     let fitted = Vectors {
         id: "calibrated",
         title: "",
@@ -110,16 +110,16 @@ fn rows(b: &BoardErrors) -> Vec<Vectors<'_>> {
     [fitted, after].into_iter().filter(|v| !v.x_mm.is_empty()).collect()
 }
 
-fn map(
+fn map_entity(
     board: &BoardErrors,
     v: &Vectors,
     (centre_m, title_m): (&Vector3<f64>, &Vector3<f64>),
     scale: &Scale,
     time_ns: i64,
 ) -> fox::SceneEntity {
-    let mut map = entity(format!("{}/{}", v.id, board.recording_index), time_ns);
-    map.metadata.push(note("recording", &board.recording));
-    map.metadata.push(note("magnification", board.magnification));
+    let mut map = scene_entity(format!("{}/{}", v.id, board.recording_index), time_ns);
+    map.metadata.push(key_value("recording", &board.recording));
+    map.metadata.push(key_value("magnification", board.magnification));
     for i in 0..v.x_mm.len() {
         let place_m = centre_m + Vector3::new(board.x_mm[i], board.y_mm[i], 0.0) * 1e-3;
         let along_m = Vector3::new(v.x_mm[i], v.y_mm[i], 0.0) * 1e-3 * board.magnification;
@@ -137,10 +137,10 @@ fn map(
             ramp(scale.small_m, scale.large_m, error_m),
         ));
     }
-    map.texts.push(text(title_m, scale.text_m, INK, title(board, v)));
+    map.texts.push(billboard_text(title_m, scale.text_m, INK, board_title(board, v)));
     map
 }
 
-fn title(board: &BoardErrors, v: &Vectors) -> String {
-    printable(&board.recording) + v.title
+fn board_title(board: &BoardErrors, v: &Vectors) -> String {
+    printable_name(&board.recording) + v.title
 }

@@ -3,7 +3,7 @@
 use super::arrows::POINTS;
 use super::board_grid::Grid;
 use crate::findings::Findings;
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use armcal_result::Run;
 
 /// Height of text as a share of the line that it lies in, where it is not too wide.
@@ -48,8 +48,8 @@ impl Scale {
             "errors x {magnification}, {from}\n\
              to {to}\n\
              green {} mm, red {} mm and more",
-            millimetres(self.small_m),
-            millimetres(self.large_m)
+            format_mm(self.small_m),
+            format_mm(self.large_m)
         )
     }
 }

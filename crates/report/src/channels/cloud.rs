@@ -1,9 +1,9 @@
 //! Errors as a point cloud, one a recording: every measured tip with its errors as fields, for viewers that colour by one.
 
 use super::arrows::Drawing;
-use super::shapes::at;
+use super::shapes::unrotated_pose;
 use super::{Messages, WORLD, start_ns, timestamp};
-use armcal_result::proto::count;
+use armcal_result::proto::saturating_u32;
 use armcal_result::{Point, RecordingRun};
 use foxglove::messages as fox;
 use foxglove::messages::packed_element_field::NumericType;
@@ -22,7 +22,7 @@ pub(super) fn put(recording: &RecordingRun, own: &[&Point], drawing: &Drawing, o
     let seen = own.iter().filter(|p| p.measured_m.iter().all(|x| x.is_finite()));
     let bytes = |p: &&Point| {
         let colour = drawing.ramp(p.residual.fitted_m.norm()).map(|part| (255.0 * part).round() as u8);
-        row(p).into_iter().flat_map(f32::to_le_bytes).chain(colour).collect::<Vec<u8>>()
+        field_values(p).into_iter().flat_map(f32::to_le_bytes).chain(colour).collect::<Vec<u8>>()
     };
     let data: Vec<u8> = seen.flat_map(bytes).collect();
     if data.is_empty() {
@@ -33,7 +33,7 @@ pub(super) fn put(recording: &RecordingRun, own: &[&Point], drawing: &Drawing, o
         offset: k * BYTES,
         r#type: NumericType::Float32 as i32,
     };
-    let numbers = count(FIELDS.len()) * BYTES;
+    let numbers = saturating_u32(FIELDS.len()) * BYTES;
     let part = |(k, name): (u32, &&str)| fox::PackedElementField {
         name: (*name).to_owned(),
         offset: numbers + k,
@@ -42,8 +42,8 @@ pub(super) fn put(recording: &RecordingRun, own: &[&Point], drawing: &Drawing, o
     let cloud = fox::PointCloud {
         timestamp: Some(timestamp(start_ns)),
         frame_id: WORLD.into(),
-        pose: Some(at(&Vector3::zeros())),
-        point_stride: numbers + count(COLOUR.len()),
+        pose: Some(unrotated_pose(&Vector3::zeros())),
+        point_stride: numbers + saturating_u32(COLOUR.len()),
         fields: (0..).zip(&FIELDS).map(field).chain((0..).zip(&COLOUR).map(part)).collect(),
         data: data.into(),
     };
@@ -51,7 +51,7 @@ pub(super) fn put(recording: &RecordingRun, own: &[&Point], drawing: &Drawing, o
 }
 
 /// In the order of [`FIELDS`]; without anything found, the error after it is that of the calibration.
-fn row(p: &Point) -> [f32; 7] {
+fn field_values(p: &Point) -> [f32; 7] {
     let mm = |error: &Vector3<f64>| error.norm() * 1e3;
     let after = p.steps_m.last().unwrap_or(&p.residual.fitted_m);
     let m = &p.measured_m;

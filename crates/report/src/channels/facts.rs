@@ -1,18 +1,18 @@
 //! The facts as protobuf messages of `proto/armcal.proto`.
 
-use super::{Messages, run_start_ns, start_ns, to_sensor_ns, unsigned};
+use super::{Messages, run_start_ns, start_ns, to_sensor_ns, unsigned_ns};
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors};
 use armcal_core::{Dwell, ErrorStats, TipMeasurement};
 use armcal_dwell::ClockAlignment;
-use armcal_result::proto::{count, parameter};
-use armcal_result::{Point, RecordingNames, Run, VERSION, effects, proto, status_word};
+use armcal_result::proto::{parameter_message, saturating_u32};
+use armcal_result::{Point, RecordingNames, Run, VERSION, effect_part_names, proto, status_word};
 use armcal_table::{Assignment, Place};
-use armcal_wording::{conclusion, estimate_shown, remark};
+use armcal_wording::{conclusion, estimate_remark, estimate_shown};
 use nalgebra::Vector3;
 
 pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     let begin_ns = run_start_ns(run);
-    out.put("/armcal/parameters", begin_ns, &parameters(&run.calibration.fit, begin_ns));
+    out.put("/armcal/parameters", begin_ns, &parameters_message(&run.calibration.fit, begin_ns));
     out.put(
         "/armcal/parameter_table",
         begin_ns,
@@ -21,7 +21,7 @@ pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
     out.put(
         "/armcal/report",
         begin_ns,
-        &calibration(&run.pipeline_name, &run.calibration, conclusion(&run.calibration), begin_ns),
+        &calibration_message(&run.pipeline_name, &run.calibration, conclusion(&run.calibration), begin_ns),
     );
     let used = run.observed();
     for (index, recording) in run.recordings.iter().enumerate() {
@@ -37,24 +37,24 @@ pub(super) fn put(run: &Run, points: &[Point], out: &mut Messages) {
             let publish_ns = seen.map_or(time_ns, |clock| to_sensor_ns(clock, time_ns));
             out.put_published("/armcal/dwells", time_ns, publish_ns, &dwell_message(&recording.name, dwell));
             let place = (assigned.get(&dwell.id).copied(), why_not.get(&dwell.id).copied());
-            let message = assignment(&recording.name, dwell, place, used.contains(&dwell.id));
+            let message = assignment_message(&recording.name, dwell, place, used.contains(&dwell.id));
             out.put("/armcal/assignments", time_ns, &message);
         }
     }
     for point in points {
-        out.put("/armcal/residuals", point.observation.time_ns, &residual(run, point));
+        out.put("/armcal/residuals", point.observation.time_ns, &residual_message(run, point));
     }
 }
 
 /// A dwell of the recording of this name.
 pub(super) fn dwell_message(recording: &str, d: &Dwell) -> proto::Dwell {
     proto::Dwell {
-        timestamp: time(d.mid_ns()),
+        timestamp: proto_time(d.mid_ns()),
         recording: recording.to_owned(),
-        recording_index: count(d.id.recording),
-        dwell: count(d.id.dwell),
-        start: time(d.start_ns),
-        end: time(d.end_ns),
+        recording_index: saturating_u32(d.id.recording),
+        dwell: saturating_u32(d.id.dwell),
+        start: proto_time(d.start_ns),
+        end: proto_time(d.end_ns),
         duration_s: d.duration_s(),
         joint_rad: d.joint_rad.clone(),
         joint_deg: d.joint_rad.iter().map(|q| q.to_degrees()).collect(),
@@ -62,27 +62,27 @@ pub(super) fn dwell_message(recording: &str, d: &Dwell) -> proto::Dwell {
         joint_sigma_rad: d.joint_sigma_rad.clone(),
         effort_nm: d.effort_nm.clone().unwrap_or_default(),
         arrival_sign: d.arrival.iter().map(|a| a.sign() as i32).collect(),
-        samples: count(d.samples),
+        samples: saturating_u32(d.samples),
         effective_samples: d.effective_samples,
-        tip: d.tip.as_ref().map(tip),
+        tip: d.tip.as_ref().map(tip_message),
         temperature_c: d.temperature_c,
     }
 }
 
-fn tip(t: &TipMeasurement) -> proto::TipMeasurement {
+fn tip_message(t: &TipMeasurement) -> proto::TipMeasurement {
     let q = t.orientation.map(|q| proto::Quaternion { x: q.i, y: q.j, z: q.k, w: q.w });
     proto::TipMeasurement {
-        position_m: Some(vector(&t.position_m)),
-        position_sigma_mm: Some(vector(&t.covariance_m2.diagonal().map(|v| v.sqrt() * 1e3))),
+        position_m: Some(proto_vector(&t.position_m)),
+        position_sigma_mm: Some(proto_vector(&t.covariance_m2.diagonal().map(|v| v.sqrt() * 1e3))),
         orientation: q,
         orientation_sigma_rad: t.orientation.map(|_| t.orientation_sigma_rad),
-        samples: count(t.samples),
+        samples: saturating_u32(t.samples),
         effective_samples: t.effective_samples,
     }
 }
 
 /// Where a dwell of the recording of this name was, and why it was not used.
-fn assignment(
+fn assignment_message(
     recording: &str,
     dwell: &Dwell,
     (assigned, why_not): (Option<&Assignment>, Option<&str>),
@@ -90,10 +90,10 @@ fn assignment(
 ) -> proto::Assignment {
     use proto::assignment::Place as P;
     let mut message = proto::Assignment {
-        timestamp: time(dwell.mid_ns()),
+        timestamp: proto_time(dwell.mid_ns()),
         recording: recording.to_owned(),
-        recording_index: count(dwell.id.recording),
-        dwell: count(dwell.id.dwell),
+        recording_index: saturating_u32(dwell.id.recording),
+        dwell: saturating_u32(dwell.id.dwell),
         distance_mm: assigned.map(|a| a.distance_m * 1e3).filter(|d| d.is_finite()),
         used,
         why: why_not.unwrap_or_default().to_owned(),
@@ -126,31 +126,31 @@ fn assignment(
     message
 }
 
-fn residual(run: &Run, point: &Point) -> proto::Residual {
+fn residual_message(run: &Run, point: &Point) -> proto::Residual {
     let o = point.observation;
     proto::Residual {
         cavity: o.cavity().unwrap_or_default().to_owned(),
         feature: run.model.measured_name(o),
-        measured_m: Some(vector(&point.measured_m)),
-        predicted_m: Some(vector(&point.predicted_m)),
+        measured_m: Some(proto_vector(&point.measured_m)),
+        predicted_m: Some(proto_vector(&point.predicted_m)),
         step_norm_mm: point.steps_m.iter().map(|r| r.norm() * 1e3).collect(),
-        ..error(run.recording_name(o.dwell), o.time_ns, point.residual)
+        ..residual_errors(run.recording_name(o.dwell), o.time_ns, point.residual)
     }
 }
 
 /// The errors of one observation, without its places.
-pub(super) fn error(recording: &str, time_ns: i64, r: &Residual) -> proto::Residual {
+pub(super) fn residual_errors(recording: &str, time_ns: i64, r: &Residual) -> proto::Residual {
     proto::Residual {
-        timestamp: time(time_ns),
+        timestamp: proto_time(time_ns),
         recording: recording.to_owned(),
-        recording_index: count(r.dwell.recording),
-        dwell: count(r.dwell.dwell),
+        recording_index: saturating_u32(r.dwell.recording),
+        dwell: saturating_u32(r.dwell.dwell),
         held_out: r.held_out,
-        nominal_mm: Some(vector(&(r.nominal_m * 1e3))),
+        nominal_mm: Some(proto_vector(&(r.nominal_m * 1e3))),
         nominal_norm_mm: r.nominal_m.norm() * 1e3,
-        fitted_mm: Some(vector(&(r.fitted_m * 1e3))),
+        fitted_mm: Some(proto_vector(&(r.fitted_m * 1e3))),
         fitted_norm_mm: r.fitted_m.norm() * 1e3,
-        whitened: Some(vector(&r.whitened)),
+        whitened: Some(proto_vector(&r.whitened)),
         weight: r.weight,
         expected_norm_mm: r.expected_norm_m * 1e3,
         ..Default::default()
@@ -158,10 +158,10 @@ pub(super) fn error(recording: &str, time_ns: i64, r: &Residual) -> proto::Resid
 }
 
 /// Every parameter of a fit.
-pub(super) fn parameters(fit: &Fit, time_ns: i64) -> proto::Parameters {
+pub(super) fn parameters_message(fit: &Fit, time_ns: i64) -> proto::Parameters {
     proto::Parameters {
-        timestamp: time(time_ns),
-        parameters: fit.estimates.iter().map(parameter).collect(),
+        timestamp: proto_time(time_ns),
+        parameters: fit.estimates.iter().map(parameter_message).collect(),
         undetermined: fit.undetermined.iter().map(|u| u.text.clone()).collect(),
     }
 }
@@ -178,7 +178,7 @@ pub(super) fn parameter_table(fit: &Fit, names: &RecordingNames, time_ns: i64) -
             change,
             interval95: format!("± {half}"),
             unit: e.parameter.unit.display_symbol().into(),
-            remark: remark(e).into(),
+            remark: estimate_remark(e).into(),
             meaning: e.parameter.meaning.clone(),
         }
     };
@@ -188,28 +188,28 @@ pub(super) fn parameter_table(fit: &Fit, names: &RecordingNames, time_ns: i64) -
     };
     let mut free: Vec<&Estimate> = fit.estimates.iter().filter(|e| e.parameter.free).collect();
     free.sort_by(|a, b| b.determined.cmp(&a.determined).then(changed(b).total_cmp(&changed(a))));
-    proto::ParameterTable { timestamp: time(time_ns), rows: free.into_iter().map(row).collect() }
+    proto::ParameterTable { timestamp: proto_time(time_ns), rows: free.into_iter().map(row).collect() }
 }
 
 /// The calibration of the pipeline of this name, and what it comes to in a sentence.
-pub(super) fn calibration(
+pub(super) fn calibration_message(
     pipeline: &str,
     c: &Calibration,
     conclusion: String,
     time_ns: i64,
 ) -> proto::Calibration {
     proto::Calibration {
-        timestamp: time(time_ns),
+        timestamp: proto_time(time_ns),
         pipeline: pipeline.to_owned(),
         version: VERSION.into(),
         objective: c.fit.objective.clone(),
-        effects: effects(c).into_iter().map(str::to_owned).collect(),
+        effects: effect_part_names(c).into_iter().map(str::to_owned).collect(),
         status: status_word(c.fit.status).into(),
-        iterations: count(c.fit.iterations),
+        iterations: saturating_u32(c.fit.iterations),
         noise_floor_mm: c.noise_floor_m * 1e3,
-        train: Some(side(&c.train)),
-        holdout: Some(side(&c.holdout)),
-        rank: count(c.fit.rank),
+        train: Some(side_message(&c.train)),
+        holdout: Some(side_message(&c.holdout)),
+        rank: saturating_u32(c.fit.rank),
         undetermined: c.fit.undetermined.iter().map(|u| u.text.clone()).collect(),
         sigma_scale: c.fit.sigma_scale,
         sum_of_distances: c.fit.paper.map(|p| proto::SumOfDistances {
@@ -221,15 +221,15 @@ pub(super) fn calibration(
     }
 }
 
-fn side(s: &SideErrors) -> proto::Side {
+fn side_message(s: &SideErrors) -> proto::Side {
     proto::Side {
-        observations: count(s.fitted.n),
-        nominal: Some(errors(&s.nominal)),
-        fitted: Some(errors(&s.fitted)),
+        observations: saturating_u32(s.fitted.n),
+        nominal: Some(errors_message(&s.nominal)),
+        fitted: Some(errors_message(&s.fitted)),
     }
 }
 
-fn errors(s: &ErrorStats) -> proto::Errors {
+fn errors_message(s: &ErrorStats) -> proto::Errors {
     proto::Errors {
         mean_mm: s.mean_m * 1e3,
         rms_mm: s.rms_m * 1e3,
@@ -240,25 +240,25 @@ fn errors(s: &ErrorStats) -> proto::Errors {
 
 fn clock_alignment(c: &ClockAlignment, recording: &str, index: usize, time_ns: i64) -> proto::ClockAlignment {
     proto::ClockAlignment {
-        timestamp: time(time_ns),
+        timestamp: proto_time(time_ns),
         recording: recording.to_owned(),
-        recording_index: count(index),
+        recording_index: saturating_u32(index),
         offset_ms: c.offset_s * 1e3,
         offset_sigma_ms: c.offset_sigma_s * 1e3,
         drift_ppm: c.drift * 1e6,
         drift_sigma_ppm: c.drift_sigma * 1e6,
-        reference: time(c.reference_ns),
+        reference: proto_time(c.reference_ns),
         correlation: c.correlation,
         displacement_ratio: c.displacement_ratio,
     }
 }
 
-pub(super) fn vector(v: &Vector3<f64>) -> proto::Vector {
+pub(super) fn proto_vector(v: &Vector3<f64>) -> proto::Vector {
     proto::Vector { x: v.x, y: v.y, z: v.z }
 }
 
-pub(super) fn time(time_ns: i64) -> Option<prost_types::Timestamp> {
-    let time_ns = unsigned(time_ns);
+pub(super) fn proto_time(time_ns: i64) -> Option<prost_types::Timestamp> {
+    let time_ns = unsigned_ns(time_ns);
     let seconds = i64::try_from(time_ns / 1_000_000_000).unwrap_or(i64::MAX);
     Some(prost_types::Timestamp { seconds, nanos: (time_ns % 1_000_000_000) as i32 })
 }

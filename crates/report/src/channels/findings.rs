@@ -1,6 +1,6 @@
 //! What was found, at the beginning of the run (of the recording, where it is about one).
 
-use super::facts::time;
+use super::facts::proto_time;
 use super::{Messages, run_start_ns, start_ns};
 use crate::findings::Findings;
 use crate::viewer_text::for_viewer;
@@ -10,15 +10,15 @@ use armcal_wording::{Story, ToldWarning};
 
 pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
-    let stamp = || time(begin_ns);
-    out.put("/armcal/story", begin_ns, &story(&Story::of(run), begin_ns));
+    let stamp = || proto_time(begin_ns);
+    out.put("/armcal/story", begin_ns, &outcome_message(&Story::of(run), begin_ns));
     for joint in &f.joints {
         let topic = implied_topic(joint.number);
         out.put(topic, begin_ns, &proto::JointErrors { timestamp: stamp(), ..joint.clone() });
     }
     for board in &f.boards {
         let start_ns = start_ns(&run.recordings[board.recording_index as usize]);
-        let message = proto::BoardErrors { timestamp: time(start_ns), ..board.clone() };
+        let message = proto::BoardErrors { timestamp: proto_time(start_ns), ..board.clone() };
         out.put(board_topic(board.recording_index), start_ns, &message);
     }
     out.put("/armcal/course", begin_ns, &proto::Course { timestamp: stamp(), ..f.course.clone() });
@@ -38,9 +38,9 @@ pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
     out.put("/armcal/quality", begin_ns, &proto::Quality { timestamp: stamp(), ..f.quality.clone() });
 }
 
-pub(super) fn story(s: &Story, time_ns: i64) -> proto::Story {
+pub(super) fn outcome_message(s: &Story, time_ns: i64) -> proto::Story {
     proto::Story {
-        timestamp: time(time_ns),
+        timestamp: proto_time(time_ns),
         lamp: s.lamp.into(),
         lines: for_viewer(s.lines()),
         warnings: for_viewer(s.warnings.iter().map(ToldWarning::line)),

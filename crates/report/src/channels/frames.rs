@@ -16,32 +16,38 @@ pub(super) const BOARD: &str = "board";
 /// What stands still whether or not the arm ever dwells.
 pub(super) fn put_standing(run: &Run, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
-    out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: standing(begin_ns) });
+    out.put("/armcal/tf", begin_ns, &fox::FrameTransforms { transforms: fixed_transforms(begin_ns) });
 }
 
 /// The world, with nothing in it yet.
-fn world(time_ns: i64) -> fox::FrameTransform {
-    transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity())
+fn world_transform(time_ns: i64) -> fox::FrameTransform {
+    frame_transform(time_ns, RERUN_ROOT, WORLD, &Pose::identity())
 }
 
 /// The frames of the arms under a prefix, each in the one that it hangs on.
-fn arm(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64], time_ns: i64) -> Vec<fox::FrameTransform> {
+fn arm_transforms(
+    model: &Model,
+    prefix: &str,
+    p: &[f64],
+    joint_rad: &[f64],
+    time_ns: i64,
+) -> Vec<fox::FrameTransform> {
     let links = links(model, prefix, p, joint_rad);
     let hung = |link: &Link| {
         let parent = link.parent.map_or(WORLD, |parent| links[parent].name.as_str());
-        transform(time_ns, parent, &link.name, &link.in_parent)
+        frame_transform(time_ns, parent, &link.name, &link.in_parent)
     };
     links.iter().map(hung).collect()
 }
 
 /// The world, and the map of boards beside it.
-fn standing(time_ns: i64) -> Vec<fox::FrameTransform> {
-    vec![world(time_ns), board_map(time_ns)]
+fn fixed_transforms(time_ns: i64) -> Vec<fox::FrameTransform> {
+    vec![world_transform(time_ns), board_map(time_ns)]
 }
 
 /// The map of boards is a drawing, so where it lies does not matter.
 fn board_map(time_ns: i64) -> fox::FrameTransform {
-    transform(time_ns, WORLD, super::board_map::FRAME, &Pose::identity())
+    frame_transform(time_ns, WORLD, super::board_map::FRAME, &Pose::identity())
 }
 
 /// A frame of the arm in the frame that it hangs on, a base in the world.
@@ -72,20 +78,20 @@ pub(super) fn links(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64]) -
 /// The tree in the pose of a dwell, complete.
 pub(super) fn put(run: &Run, recording: usize, dwell: &Dwell, time_ns: i64, out: &mut Messages) {
     let fitted = run.calibration.fit.values();
-    let mut transforms = standing(time_ns);
+    let mut transforms = fixed_transforms(time_ns);
     for (prefix, p) in [("nominal", &run.calibration.nominal_values), ("calibrated", &fitted)] {
         let (model, p) = run.model.in_recording(recording, p);
-        transforms.extend(arm(model, prefix, &p, &dwell.joint_rad, time_ns));
+        transforms.extend(arm_transforms(model, prefix, &p, &dwell.joint_rad, time_ns));
     }
     if let Some(board) = run.model.board_in_world(&fitted, recording) {
         let name = format!("board/{}", run.recordings[recording].name);
-        transforms.push(transform(time_ns, WORLD, &name, &board));
-        transforms.push(transform(time_ns, WORLD, BOARD, &board));
+        transforms.push(frame_transform(time_ns, WORLD, &name, &board));
+        transforms.push(frame_transform(time_ns, WORLD, BOARD, &board));
     }
     out.put("/armcal/tf", time_ns, &fox::FrameTransforms { transforms });
 }
 
-fn transform(time_ns: i64, parent: &str, child: &str, parent_from_child: &Pose) -> fox::FrameTransform {
+fn frame_transform(time_ns: i64, parent: &str, child: &str, parent_from_child: &Pose) -> fox::FrameTransform {
     fox::FrameTransform {
         timestamp: Some(timestamp(time_ns)),
         parent_frame_id: parent.into(),

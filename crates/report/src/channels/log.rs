@@ -11,10 +11,10 @@ use std::collections::BTreeMap;
 
 const TOPIC: &str = "/armcal/log";
 
-pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
+pub(super) fn put_milestones(run: &Run, findings: &Findings, out: &mut Messages) {
     let begin_ns = run_start_ns(run);
     let opening = format!("armcal {VERSION}, pipeline {}", run.pipeline_name);
-    put(out, begin_ns, Level::Info, "armcal", &run.pipeline_name, opening);
+    put_line(out, begin_ns, Level::Info, "armcal", &run.pipeline_name, opening);
     let names = run.recording_names();
     for warning in run.overall_warnings() {
         put_warning(out, begin_ns, &names.warning(&warning));
@@ -28,7 +28,7 @@ pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
             run.associated(recording),
             recording.rejected()
         );
-        put(out, start_ns, Level::Info, "armcal.dwell", &recording.name, found);
+        put_line(out, start_ns, Level::Info, "armcal.dwell", &recording.name, found);
         for warning in recording.all_warnings() {
             put_warning(out, start_ns, &names.warning(warning));
         }
@@ -36,17 +36,18 @@ pub(super) fn milestones(run: &Run, findings: &Findings, out: &mut Messages) {
         for rejection in &recording.rejections {
             let time_ns = mid_ns.get(&rejection.dwell).copied().unwrap_or(start_ns);
             let why = format!("dwell {} not used: {}", rejection.dwell.dwell, rejection.why);
-            put(out, time_ns, Level::Debug, "armcal.dwell", &recording.name, why);
+            put_line(out, time_ns, Level::Debug, "armcal.dwell", &recording.name, why);
         }
     }
-    put(out, run_end_ns(run), Level::Info, "armcal.calibrate", "", conclusion(&run.calibration));
-    verdict(run_end_ns(run), findings, out);
+    put_line(out, run_end_ns(run), Level::Info, "armcal.calibrate", "", conclusion(&run.calibration));
+    put_verdict(run_end_ns(run), findings, out);
 }
 
 /// What the diagnosis says, what each step brought, and what to record next.
-fn verdict(time_ns: i64, findings: &Findings, out: &mut Messages) {
+fn put_verdict(time_ns: i64, findings: &Findings, out: &mut Messages) {
     let Some((diagnosis, _)) = &findings.diagnosis else { return };
-    let mut say = |level, subject: &str, words| put(out, time_ns, level, "armcal.diagnose", subject, words);
+    let mut say =
+        |level, subject: &str, words| put_line(out, time_ns, level, "armcal.diagnose", subject, words);
     let level = if diagnosis.verdict == "nothing_missing" { Level::Info } else { Level::Warning };
     say(level, &diagnosis.verdict, diagnosis.sentence.clone());
     for step in findings.steps.steps.iter().skip(2) {
@@ -78,11 +79,11 @@ pub(super) fn put_warning(out: &mut Messages, time_ns: i64, warning: &Warning) {
         Stage::Output => "armcal.report",
     };
     let message = format!("{warning} [{}]", warning.code);
-    put(out, time_ns, level, name, &warning.subject, message);
+    put_line(out, time_ns, level, name, &warning.subject, message);
 }
 
 /// `subject` goes where a log has its source file: the thing the message is about.
-pub(super) fn put(
+pub(super) fn put_line(
     out: &mut Messages,
     time_ns: i64,
     level: Level,

@@ -59,7 +59,7 @@ use crate::findings::Findings;
 use armcal_core::Dwell;
 use armcal_dwell::ClockAlignment;
 use armcal_recording::RecordingReport;
-use armcal_result::proto::count;
+use armcal_result::proto::saturating_u32;
 use armcal_result::{Point, RecordingRun, Run};
 use foxglove::messages::Timestamp;
 use foxglove::{Encode, Schema};
@@ -78,9 +78,9 @@ pub(crate) struct ResultMessage {
 }
 
 /// All result messages in the order of their log times.
-pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<ResultMessage> {
+pub(crate) fn result_messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<ResultMessage> {
     let mut out = Messages::default();
-    log::milestones(run, findings, &mut out);
+    log::put_milestones(run, findings, &mut out);
     facts::put(run, points, &mut out);
     findings::put(run, findings, &mut out);
     frames::put_standing(run, &mut out);
@@ -92,14 +92,14 @@ pub(crate) fn messages(run: &Run, points: &[Point], findings: &Findings) -> Vec<
             points.iter().filter(|p| p.observation.dwell.recording == index).collect();
         paths::put(recording, &of_one_feature(&of_recording), &mut out);
         cloud::put(recording, &of_recording, &drawing, &mut out);
-        scene::standing(run, index, &of_recording, &drawing, &mut out);
+        scene::put_standing(run, index, &of_recording, &drawing, &mut out);
         arrows::put(run, index, &of_recording, &drawing, &mut out);
         let shown = || run.posed(recording);
         // A viewer draws nothing before the first message: until the first dwell the arm stands as in it.
         let first = shown().take(1).map(|dwell| (dwell, start_ns(recording)));
         for (dwell, time_ns) in first.chain(shown().map(|dwell| (dwell, dwell.mid_ns()))) {
             frames::put(run, index, dwell, time_ns, &mut out);
-            scene::arms(run, dwell, &of_recording, time_ns, &mut out);
+            scene::put_arms(run, dwell, &of_recording, time_ns, &mut out);
         }
     }
     out.messages.sort_by_key(|m| m.log_ns);
@@ -159,35 +159,35 @@ impl Messages {
             topic: topic.into(),
             schema: T::get_schema().expect("protobuf messages have a schema"),
             message_encoding: T::get_message_encoding(),
-            log_ns: unsigned(log_ns),
-            publish_ns: unsigned(publish_ns),
+            log_ns: unsigned_ns(log_ns),
+            publish_ns: unsigned_ns(publish_ns),
             data,
         });
     }
 
     /// Text as ROS 2 has it: a string in little-endian CDR (OMG DDS-XTypes 1.3, 7.4) behind its four bytes of header.
     fn put_text(&mut self, topic: &str, time_ns: i64, text: &str) {
-        let length = count(text.len() + 1).to_le_bytes();
+        let length = saturating_u32(text.len() + 1).to_le_bytes();
         let data = [&[0, 1, 0, 0], &length[..], text.as_bytes(), &[0]].concat();
         self.messages.push(ResultMessage {
             topic: topic.into(),
             schema: Schema::new("std_msgs/msg/String", "ros2msg", b"string data\n".as_slice()),
             message_encoding: "cdr".into(),
-            log_ns: unsigned(time_ns),
-            publish_ns: unsigned(time_ns),
+            log_ns: unsigned_ns(time_ns),
+            publish_ns: unsigned_ns(time_ns),
             data,
         });
     }
 }
 
 /// MCAP has no time before 1970.
-fn unsigned(time_ns: i64) -> u64 {
+fn unsigned_ns(time_ns: i64) -> u64 {
     u64::try_from(time_ns).unwrap_or(0)
 }
 
 /// The time as Foxglove's messages carry it.
 fn timestamp(time_ns: i64) -> Timestamp {
-    let time_ns = unsigned(time_ns);
+    let time_ns = unsigned_ns(time_ns);
     let seconds = u32::try_from(time_ns / 1_000_000_000).unwrap_or(u32::MAX);
     Timestamp::new(seconds, (time_ns % 1_000_000_000) as u32)
 }
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn times_outside_the_formats_range_saturate() {
-        assert_eq!(unsigned(-5), 0);
+        assert_eq!(unsigned_ns(-5), 0);
         assert_eq!(timestamp(-5), Timestamp::new(0, 0));
         assert_eq!(timestamp(1_500_000_000), Timestamp::new(1, 500_000_000));
         assert_eq!(timestamp(i64::MAX).sec(), u32::MAX);

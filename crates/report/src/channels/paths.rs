@@ -1,6 +1,6 @@
 //! The tip from observation to observation: measured, and as both robots predict it.
 
-use super::shapes::{at, pose};
+use super::shapes::{pose, unrotated_pose};
 use super::{Messages, WORLD, start_ns, timestamp, to_sensor_ns};
 use armcal_core::Pose;
 use armcal_result::{Point, RecordingRun};
@@ -15,7 +15,7 @@ pub(super) fn put(recording: &RecordingRun, points: &[&Point], out: &mut Message
     in_time.sort_by_key(|p| p.observation.time_ns);
     let start_ns = start_ns(recording);
     let mut path = |topic, position_m: fn(&Point) -> Vector3<f64>| {
-        let poses = in_time.iter().map(|p| at(&position_m(p))).collect();
+        let poses = in_time.iter().map(|p| unrotated_pose(&position_m(p))).collect();
         let message =
             fox::PosesInFrame { timestamp: Some(timestamp(start_ns)), frame_id: WORLD.into(), poses };
         out.put(topic, start_ns, &message);
@@ -37,7 +37,7 @@ fn put_tip(recording: &RecordingRun, point: &Point, out: &mut Messages) {
             let rotation = point.observation.seen_orientation().map(|(seen, _)| *seen).unwrap_or_default();
             (stamp_ns, pose(&Pose::from_parts(point.measured_m.into(), rotation)))
         }
-        false => (time_ns, at(&point.measured_m)),
+        false => (time_ns, unrotated_pose(&point.measured_m)),
     };
     let message =
         fox::PoseInFrame { timestamp: Some(timestamp(time_ns)), frame_id: WORLD.into(), pose: Some(tip) };

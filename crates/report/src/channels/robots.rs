@@ -47,7 +47,7 @@ fn arm_urdf(model: &Model, prefix: &str, p: &[f64], joint_rad: &[f64], rgba: Rgb
     let turned: Vec<f64> = joint_rad.iter().map(|q| q + TURNED).collect();
     let [stands, turned] = [joint_rad, &turned].map(|joint_rad| links(model, prefix, p, joint_rad));
     // Viewers make a path of it.
-    urdf(&escaped(&prefix.replace('/', "_")), &stands, &turned, rgba)
+    links_urdf(&escape_xml(&prefix.replace('/', "_")), &stands, &turned, rgba)
 }
 
 /// Plate and cavities in the frame of the board.
@@ -58,8 +58,8 @@ fn board_urdf(board: &Board) -> String {
         let _ = write!(
             visual,
             "<visual>{}<geometry><box size=\"{x} {y} {z}\"/></geometry>{}</visual>",
-            origin(&centre),
-            material("plate")
+            origin_element(&centre),
+            material_element("plate")
         );
     }
     for cavity in &board.cavities {
@@ -68,65 +68,66 @@ fn board_urdf(board: &Board) -> String {
         let _ = write!(
             visual,
             "<visual>{}<geometry><cylinder radius=\"{radius_m}\" length=\"{DISC_M}\"/></geometry>{}</visual>",
-            origin(&place),
-            material("cavity")
+            origin_element(&place),
+            material_element("cavity")
         );
     }
-    let materials =
-        [("plate", scene::PLATE), ("cavity", scene::CAVITY)].map(|(name, rgba)| defined(name, rgba)).concat();
+    let materials = [("plate", scene::PLATE), ("cavity", scene::CAVITY)]
+        .map(|(name, rgba)| material_definition(name, rgba))
+        .concat();
     format!(
         "{HEAD}<robot name=\"board\">\n{materials}  <link name=\"{BOARD_FRAME}\">{visual}</link>\n</robot>\n"
     )
 }
 
-fn material(name: &str) -> String {
+fn material_element(name: &str) -> String {
     format!("<material name=\"{name}\"/>")
 }
 
-fn defined(name: &str, [r, g, b, a]: Rgba) -> String {
+fn material_definition(name: &str, [r, g, b, a]: Rgba) -> String {
     format!("  <material name=\"{name}\"><color rgba=\"{r} {g} {b} {a}\"/></material>\n")
 }
 
 /// Links in the pose `stands`; `turned` are the same with all joints turned. What is between two frames is drawn with the one
 /// in which it does not move: the first for a URDF, the second for Denavit-Hartenberg rows.
-fn urdf(prefix: &str, stands: &[Link], turned: &[Link], rgba: Rgba) -> String {
+fn links_urdf(prefix: &str, stands: &[Link], turned: &[Link], rgba: Rgba) -> String {
     let mut visuals = vec![String::new(); stands.len()];
     for (k, link) in stands.iter().enumerate() {
         let Some(parent) = link.parent else { continue };
         let (here, there) = (link.in_parent, turned[k].in_parent);
         let (along, moved) = (here.translation.vector, there.translation.vector);
         if (along - moved).norm() < NOTHING_M {
-            visuals[parent] += &cylinder(&along, prefix);
+            visuals[parent] += &link_visual(&along, prefix);
         } else {
-            visuals[k] += &cylinder(&here.inverse().translation.vector, prefix);
+            visuals[k] += &link_visual(&here.inverse().translation.vector, prefix);
         }
     }
-    let mut text = format!("{HEAD}<robot name=\"{prefix}\">\n{}", defined(prefix, rgba));
+    let mut text = format!("{HEAD}<robot name=\"{prefix}\">\n{}", material_definition(prefix, rgba));
     // A robot has one root: of several arms the world.
     let arms = stands.iter().filter(|link| link.parent.is_none()).count();
     if arms > 1 {
         let _ = writeln!(text, "  <link name=\"{WORLD}\"/>");
     }
     for (link, visual) in stands.iter().zip(&visuals) {
-        let _ = writeln!(text, "  <link name=\"{}\">{visual}</link>", escaped(&link.name));
+        let _ = writeln!(text, "  <link name=\"{}\">{visual}</link>", escape_xml(&link.name));
     }
     for link in stands {
         let parent = link.parent.map_or(WORLD, |parent| stands[parent].name.as_str());
         if link.parent.is_none() && arms == 1 {
             continue;
         }
-        let (name, parent) = (escaped(&link.name), escaped(parent));
+        let (name, parent) = (escape_xml(&link.name), escape_xml(parent));
         let _ = writeln!(
             text,
             "  <joint name=\"{name}/joint\" type=\"floating\"><parent link=\"{parent}\"/><child link=\"{name}\"/>{}</joint>",
-            origin(&link.in_parent)
+            origin_element(&link.in_parent)
         );
     }
     text + "</robot>\n"
 }
 
 /// From the origin of a frame to a place in it; nothing where that is the origin.
-fn cylinder(to_m: &Vector3<f64>, of: &str) -> String {
+fn link_visual(to_m: &Vector3<f64>, of: &str) -> String {
     let length_m = to_m.norm();
     if !(length_m.is_finite() && length_m > NOTHING_M) {
         return String::new();
@@ -136,14 +137,18 @@ fn cylinder(to_m: &Vector3<f64>, of: &str) -> String {
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     let middle = Pose::from_parts((to_m / 2.0).into(), rotation);
     let shape = format!("<cylinder radius=\"{RADIUS_M}\" length=\"{length_m}\"/>");
-    format!("<visual>{}<geometry>{shape}</geometry>{}</visual>", origin(&middle), material(of))
+    format!(
+        "<visual>{}<geometry>{shape}</geometry>{}</visual>",
+        origin_element(&middle),
+        material_element(of)
+    )
 }
 
-fn origin(pose: &Pose) -> String {
+fn origin_element(pose: &Pose) -> String {
     let ([x, y, z], (roll, pitch, yaw)) = (pose.translation.vector.into(), pose.rotation.euler_angles());
     format!("<origin xyz=\"{x} {y} {z}\" rpy=\"{roll} {pitch} {yaw}\"/>")
 }
 
-fn escaped(name: &str) -> String {
+fn escape_xml(name: &str) -> String {
     quick_xml::escape::escape(name.replace(char::is_control, "_")).into_owned()
 }

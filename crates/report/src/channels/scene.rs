@@ -1,7 +1,7 @@
 //! What stands and moves in the 3D panel: board and points of a recording, and both arms dwell by dwell.
 
-use super::arrows::{Drawing, all};
-use super::shapes::{Rgba, disc, entity, line_strip, note, plate, sphere, text};
+use super::arrows::{Drawing, delete_all};
+use super::shapes::{Rgba, billboard_text, disc, key_value, line_strip, plate, scene_entity, sphere};
 use super::{Messages, start_ns};
 use armcal_core::{Dwell, Pose};
 use armcal_model::Model;
@@ -27,27 +27,33 @@ const PLATE_MARGIN_M: f64 = 0.02;
 const ABOVE: f64 = 0.05;
 
 /// Board, points and scale of one recording; replaces those of the recording before.
-pub(super) fn standing(run: &Run, recording: usize, own: &[&Point], drawing: &Drawing, out: &mut Messages) {
+pub(super) fn put_standing(
+    run: &Run,
+    recording: usize,
+    own: &[&Point],
+    drawing: &Drawing,
+    out: &mut Messages,
+) {
     let time_ns = start_ns(&run.recordings[recording]);
     let mut entities = Vec::new();
-    entities.extend(board(run, recording, time_ns));
+    entities.extend(board_entity(run, recording, time_ns));
     entities.push(measured_points(own, time_ns));
     entities.extend(drawing.legend(time_ns));
-    out.put("/armcal/scene", time_ns, &fox::SceneUpdate { deletions: vec![all(time_ns)], entities });
+    out.put("/armcal/scene", time_ns, &fox::SceneUpdate { deletions: vec![delete_all(time_ns)], entities });
 }
 
 /// Both arms in the pose of a dwell, and the tip as it was measured.
-pub(super) fn arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: &mut Messages) {
+pub(super) fn put_arms(run: &Run, dwell: &Dwell, own: &[&Point], time_ns: i64, out: &mut Messages) {
     let fitted = run.calibration.fit.values();
     let drawn = |id: &str, p: &[f64], rgba: Rgba| {
         let (model, p) = run.model.in_recording(dwell.id.recording, p);
-        arm(id, model, &p, rgba, time_ns, &dwell.joint_rad)
+        arm_entity(id, model, &p, rgba, time_ns, &dwell.joint_rad)
     };
     let nominal = &run.calibration.nominal_values;
     let mut entities = vec![drawn("arm/nominal", nominal, GREY), drawn("arm/calibrated", &fitted, GREEN)];
     let of_tip = |p: &&&Point| p.observation.dwell == dwell.id && p.observation.feature.is_tip();
     let observed = own.iter().find(of_tip).map(|p| p.measured_m);
-    let mut measured = entity("tip/measured", time_ns);
+    let mut measured = scene_entity("tip/measured", time_ns);
     if let Some(tip_m) = observed.or(dwell.tip.as_ref().map(|t| t.position_m)) {
         measured.spheres.push(sphere(&tip_m, 0.008, WHITE));
     }
@@ -78,12 +84,19 @@ fn above_m(places: &[Vector3<f64>]) -> Option<Vector3<f64>> {
 }
 
 /// Links as lines, joints as spheres, predicted tips as smaller ones.
-fn arm(id: &str, model: &Model, p: &[f64], rgba: Rgba, time_ns: i64, joint_rad: &[f64]) -> fox::SceneEntity {
+fn arm_entity(
+    id: &str,
+    model: &Model,
+    p: &[f64],
+    rgba: Rgba,
+    time_ns: i64,
+    joint_rad: &[f64],
+) -> fox::SceneEntity {
     let world_from_base = model.base_in_world(p);
     let frames = model.link_frames(p, joint_rad);
     let places_m: Vec<Vector3<f64>> =
         frames.iter().map(|frame| (world_from_base * frame.in_base).translation.vector).collect();
-    let mut arm = entity(id, time_ns);
+    let mut arm = scene_entity(id, time_ns);
     // One line as long as each frame hangs on the one before it.
     let mut line: Vec<usize> = Vec::new();
     let mut draw = |line: &[usize]| {
@@ -106,18 +119,18 @@ fn arm(id: &str, model: &Model, p: &[f64], rgba: Rgba, time_ns: i64, joint_rad: 
 }
 
 /// Plate and cavities at the calibrated pose of the (tilted) board.
-fn board(run: &Run, recording: usize, time_ns: i64) -> Option<fox::SceneEntity> {
+fn board_entity(run: &Run, recording: usize, time_ns: i64) -> Option<fox::SceneEntity> {
     let board = run.board.as_ref()?;
     let world_from_board = run.model.board_in_world(&run.calibration.fit.values(), recording)?;
-    let mut entity = entity("board", time_ns);
-    entity.metadata.push(note("board", &board.name));
-    entity.metadata.push(note("recording", &run.recordings[recording].name));
+    let mut entity = scene_entity("board", time_ns);
+    entity.metadata.push(key_value("board", &board.name));
+    entity.metadata.push(key_value("recording", &run.recordings[recording].name));
     entity.cubes.extend(base_plate(&board.cavities, &world_from_board));
     for cavity in &board.cavities {
         let place = world_from_board * Pose::from(Translation3::from(cavity.in_board_m));
         entity.cylinders.push(disc(&place, CAVITY_DIAMETER_M, 0.001, CAVITY));
         let above_m = place * nalgebra::Point3::new(0.0, 0.0, 0.01);
-        entity.texts.push(text(&above_m.coords, 0.004, CAVITY, cavity.name.clone()));
+        entity.texts.push(billboard_text(&above_m.coords, 0.004, CAVITY, cavity.name.clone()));
     }
     Some(entity)
 }
@@ -138,7 +151,7 @@ pub(super) fn plate_of(cavities: &[Cavity]) -> Option<(Pose, Vector3<f64>)> {
 
 /// Where the tip was measured; held-out points in blue.
 fn measured_points(own: &[&Point], time_ns: i64) -> fox::SceneEntity {
-    let mut entity = entity("points", time_ns);
+    let mut entity = scene_entity("points", time_ns);
     entity.spheres.extend(own.iter().filter(|p| p.measured_m.iter().all(|x| x.is_finite())).map(|p| {
         let rgba = if p.residual.held_out { HELD_OUT } else { WHITE };
         sphere(&p.measured_m, 0.003, rgba)

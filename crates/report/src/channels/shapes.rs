@@ -31,13 +31,13 @@ pub(super) fn pose(p: &Pose) -> fox::Pose {
     fox::Pose { position: Some(vector(&p.translation.vector)), orientation: Some(quaternion(&p.rotation)) }
 }
 
-pub(super) fn at(position_m: &Vector3<f64>) -> fox::Pose {
+pub(super) fn unrotated_pose(position_m: &Vector3<f64>) -> fox::Pose {
     pose(&Pose::from_parts((*position_m).into(), UnitQuaternion::identity()))
 }
 
 pub(super) fn sphere(centre_m: &Vector3<f64>, diameter_m: f64, rgba: Rgba) -> fox::SpherePrimitive {
     fox::SpherePrimitive {
-        pose: Some(at(centre_m)),
+        pose: Some(unrotated_pose(centre_m)),
         size: Some(vector(&Vector3::repeat(diameter_m))),
         color: Some(colour(rgba)),
     }
@@ -46,7 +46,7 @@ pub(super) fn sphere(centre_m: &Vector3<f64>, diameter_m: f64, rgba: Rgba) -> fo
 pub(super) fn line_strip(points_m: &[Vector3<f64>], thickness_m: f64, rgba: Rgba) -> fox::LinePrimitive {
     fox::LinePrimitive {
         r#type: fox::line_primitive::Type::LineStrip as i32,
-        pose: Some(at(&Vector3::zeros())),
+        pose: Some(unrotated_pose(&Vector3::zeros())),
         thickness: thickness_m,
         points: points_m.iter().map(point).collect(),
         color: Some(colour(rgba)),
@@ -71,14 +71,14 @@ pub(super) fn plate(centre: &Pose, size_m: &Vector3<f64>, rgba: Rgba) -> fox::Cu
 }
 
 /// Text that turns towards the viewer; its height is in metres.
-pub(super) fn text(
+pub(super) fn billboard_text(
     position_m: &Vector3<f64>,
     height_m: f64,
     rgba: Rgba,
     words: String,
 ) -> fox::TextPrimitive {
     fox::TextPrimitive {
-        pose: Some(at(position_m)),
+        pose: Some(unrotated_pose(position_m)),
         billboard: true,
         font_size: height_m,
         scale_invariant: false,
@@ -89,7 +89,7 @@ pub(super) fn text(
 
 /// Text that is as large on the screen wherever the camera stands.
 pub(super) fn label(position_m: &Vector3<f64>, rgba: Rgba, words: String) -> fox::TextPrimitive {
-    fox::TextPrimitive { scale_invariant: true, ..text(position_m, LABEL_PX, rgba, words) }
+    fox::TextPrimitive { scale_invariant: true, ..billboard_text(position_m, LABEL_PX, rgba, words) }
 }
 
 /// An arrow with its tail at `tail_m` and the tip of its head at `tail_m + along_m`; `None` when that is nowhere.
@@ -118,7 +118,7 @@ pub(super) fn arrow(
 }
 
 /// An entity in the world frame that stays until it is replaced.
-pub(super) fn entity(id: impl Into<String>, time_ns: i64) -> fox::SceneEntity {
+pub(super) fn scene_entity(id: impl Into<String>, time_ns: i64) -> fox::SceneEntity {
     fox::SceneEntity {
         timestamp: Some(super::timestamp(time_ns)),
         frame_id: WORLD.into(),
@@ -128,7 +128,7 @@ pub(super) fn entity(id: impl Into<String>, time_ns: i64) -> fox::SceneEntity {
     }
 }
 
-pub(super) fn note(key: &str, value: impl ToString) -> fox::KeyValuePair {
+pub(super) fn key_value(key: &str, value: impl ToString) -> fox::KeyValuePair {
     fox::KeyValuePair { key: key.into(), value: value.to_string() }
 }
 

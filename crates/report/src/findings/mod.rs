@@ -47,11 +47,13 @@ impl Findings {
             course: analysis::course(run, points, &in_time),
             steps: analysis::steps(run),
             diagnosis: match &run.diagnosis {
-                Some(d) => Some((diagnosis::diagnosis(run, d), diagnosis::candidates(run, d))),
+                Some(d) => {
+                    Some((diagnosis::diagnosis_message(run, d), diagnosis::candidates_message(run, d)))
+                }
                 None if run.undiagnosed == Some(Undiagnosed::NotAsked) => None,
-                None => Some((diagnosis::none(answer(run)), proto::Candidates::default())),
+                None => Some((diagnosis::undiagnosed_message(answer(run)), proto::Candidates::default())),
             },
-            effects: run.diagnosis.as_ref().map(|d| diagnosis::table(run, d)).unwrap_or_default(),
+            effects: run.diagnosis.as_ref().map(|d| diagnosis::effect_table(run, d)).unwrap_or_default(),
             curves: unlisted_curves(run),
             next: story.next.len(),
             told_found: story.found.len(),

@@ -17,7 +17,7 @@ pub(super) fn panel_type(kind: &Kind, view: &'static str) -> &'static str {
 }
 
 /// The settings of a panel.
-pub(super) fn config(kind: &Kind) -> Map<String, Value> {
+pub(super) fn panel_config(kind: &Kind) -> Map<String, Value> {
     let value = match kind {
         Kind::Plot(plot) => plot_config(plot),
         Kind::View(view) => view_config(view),
@@ -38,7 +38,7 @@ pub(super) fn config(kind: &Kind) -> Map<String, Value> {
 
 fn plot_config(plot: &Plot) -> Value {
     let mut config = json!({
-        "paths": plot.series.iter().map(series).collect::<Vec<Value>>(),
+        "paths": plot.series.iter().map(series_config).collect::<Vec<Value>>(),
         "xAxisVal": "currentCustom",
         "xAxisPath": { "value": plot.x_path, "enabled": true },
         "xAxisLabel": plot.x_label,
@@ -57,7 +57,7 @@ fn plot_config(plot: &Plot) -> Value {
     config
 }
 
-fn series(s: &Series) -> Value {
+fn series_config(s: &Series) -> Value {
     json!({
         "value": s.path,
         "enabled": true,
@@ -108,12 +108,12 @@ fn view_config(view: &View) -> Value {
         },
         "transforms": {},
         "topics": topics,
-        "layers": robots(&view.robots),
+        "layers": robot_layers(&view.robots),
     })
 }
 
 /// Layers that draw URDF from topics; the links are called like the frames, so they have no prefix.
-fn robots(topics: &[&str]) -> Map<String, Value> {
+fn robot_layers(topics: &[&str]) -> Map<String, Value> {
     let layer = |(order, topic): (usize, &&str)| {
         let settings = json!({
             "instanceId": topic,

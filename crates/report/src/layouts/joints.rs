@@ -1,11 +1,11 @@
 //! What the dwells say about each joint, by direction of arrival.
 
-use super::panels::{BLUE, GREY, VERMILION, dots};
-use super::scale::range;
+use super::panels::{BLUE, GREY, VERMILION, dot_series};
+use super::scale::axis_range;
 use super::spec::{Colour, Content, Direction, Plot};
 use crate::channels::implied_topic;
 use crate::findings::Findings;
-use armcal_core::printable;
+use armcal_core::printable_name;
 use armcal_core::robust::percentile;
 use armcal_result::analysis::moves_tip;
 use armcal_result::proto::JointErrors;
@@ -57,22 +57,22 @@ impl What {
 }
 
 /// The joints that move the tip.
-pub(super) fn drawn(f: &Findings) -> impl Iterator<Item = &JointErrors> {
+pub(super) fn tip_moving_joints(f: &Findings) -> impl Iterator<Item = &JointErrors> {
     f.joints.iter().filter(|m| moves_tip(&m.unit, m.error.iter().copied()))
 }
 
 /// Over its angle, where play and eccentricity show.
 pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {
-    let title = format!("{}{}", printable(&m.joint), what.words());
-    joint_plot(m, &title, ("reading", "reading", &m.unit), what, range(f, m, what))
+    let title = format!("{}{}", printable_name(&m.joint), what.words());
+    joint_plot(m, &title, ("reading", "reading", &m.unit), what, axis_range(f, m, what))
 }
 
 /// Over its torque, where compliance shows; none where gravity's torque hardly moves.
 pub(super) fn over_torque(f: &Findings, m: &JointErrors, what: What) -> Option<Content> {
     let felt = f.joints.iter().zip(&f.feels_gravity).any(|(joint, felt)| joint.number == m.number && *felt);
-    let title = format!("{}{}", printable(&m.joint), what.words());
+    let title = format!("{}{}", printable_name(&m.joint), what.words());
     let torque = ("torque_nm", "gravity torque", "N m");
-    felt.then(|| joint_plot(m, &title, torque, what, range(f, m, what)))
+    felt.then(|| joint_plot(m, &title, torque, what, axis_range(f, m, what)))
 }
 
 /// Implied error by direction of arrival against one of the arrays: field, name and unit.
@@ -88,7 +88,7 @@ fn joint_plot(
         [("positive", 1, "+q", BLUE), ("negative", -1, "-q", VERMILION), ("unknown", 0, "?", GREY)];
     let seen = arrivals.into_iter().filter(|(_, sign, ..)| m.arrival.contains(sign));
     let dots_of = |(field, _, label, colour): (&str, i32, &str, Colour)| {
-        dots(path(&format!("{field}{}", what.suffix())), label, colour)
+        dot_series(path(&format!("{field}{}", what.suffix())), label, colour)
     };
     let outside =
         |[least, most]: [f64; 2]| what.whole(m).iter().filter(|e| **e < least || **e > most).count();
@@ -113,8 +113,8 @@ pub(super) fn what_effects_do(f: &Findings, of_load: bool) -> Option<Content> {
         percentile(&sigmas, 0.9)
     };
     let effect = |m: &JointErrors| size(m, What::Effect);
-    let largest = drawn(f).map(effect).fold(0.0, f64::max);
-    let mut moved: Vec<&JointErrors> = drawn(f)
+    let largest = tip_moving_joints(f).map(effect).fold(0.0, f64::max);
+    let mut moved: Vec<&JointErrors> = tip_moving_joints(f)
         .filter(|m| effect(m) >= MOVED * largest && effect(m) > ABOVE_REST * size(m, What::After))
         .collect();
     moved.sort_by(|a, b| effect(b).total_cmp(&effect(a)));

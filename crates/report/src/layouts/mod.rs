@@ -26,8 +26,8 @@ pub(crate) struct Layouts {
 }
 
 /// The layout of a run, in both formats, ending in a newline.
-pub(crate) fn layouts(run: &Run, points: &[Point], findings: &Findings) -> Layouts {
-    let content = tabs::content(run, points, findings);
+pub(crate) fn run_layouts(run: &Run, points: &[Point], findings: &Findings) -> Layouts {
+    let content = tabs::all_tabs(run, points, findings);
     let text = |value: &serde_json::Value| format!("{value:#}\n");
     Layouts { current: text(&current::layout(&content)), legacy: text(&legacy::layout(&content)) }
 }

@@ -1,6 +1,6 @@
 //! What the axes of joints reach to.
 
-use super::joints::{What, drawn};
+use super::joints::{What, tip_moving_joints};
 use crate::findings::Findings;
 use armcal_core::robust::{median, percentile};
 use armcal_result::proto::JointErrors;
@@ -16,9 +16,9 @@ const ROOM: f64 = 1.1;
 /// The same for all joints of a unit that move the tip as well as each other; one that hardly does, as the last one of a
 /// wrist that only turns the tool, would flatten the others. What effects do is compared with what they leave, which is on
 /// the same scale.
-pub(super) fn range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
+pub(super) fn axis_range(f: &Findings, m: &JointErrors, what: What) -> Option<[f64; 2]> {
     let usual = |m: &JointErrors| median(&m.sigma);
-    let unit = || drawn(f).filter(|other| other.unit == m.unit && !other.sigma.is_empty());
+    let unit = || tip_moving_joints(f).filter(|other| other.unit == m.unit && !other.sigma.is_empty());
     let sharpest = unit().map(usual).fold(f64::INFINITY, f64::min);
     let sharp = |m: &JointErrors| usual(m) <= BLUNT * sharpest;
     let (scale, shared, most) = match what {

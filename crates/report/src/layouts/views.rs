@@ -20,9 +20,9 @@ const EDGE: f64 = 1.04;
 const ANGLES_DEG: [f64; 2] = [60.0, 45.0];
 
 /// The arm and the points it visited.
-pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
+pub(super) fn world_view(run: &Run, points: &[Point], f: &Findings) -> View {
     let places = places_m(run, points);
-    let (target_m, distance_m) = sight(&places);
+    let (target_m, distance_m) = fit_camera(&places);
     let mut topics = vec![
         ("/armcal/scene", true),
         ("/armcal/arms", true),
@@ -54,7 +54,7 @@ pub(super) fn world(run: &Run, points: &[Point], f: &Findings) -> View {
 }
 
 /// Where the camera looks, and from how far all places are just in the picture [m].
-fn sight(places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
+fn fit_camera(places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
     let [phi, theta] = ANGLES_DEG.map(f64::to_radians);
     // The viewers' camera stands in -x and -y for an angle of 45 degrees about the vertical.
     let towards = Vector3::new(-phi.sin() * theta.sin(), -phi.sin() * theta.cos(), phi.cos());
@@ -73,7 +73,7 @@ fn sight(places: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
 }
 
 /// All boards from above.
-pub(super) fn map(f: &Findings) -> View {
+pub(super) fn board_map_view(f: &Findings) -> View {
     let (target_m, [width_m, height_m]) = board_map::middle_and_size_m(f);
     let topics = vec![("/armcal/board_map", true), ("/armcal/scene", false), ("/armcal/arms", false)];
     View {

@@ -4,7 +4,7 @@ use super::embed;
 use super::shell::Shell;
 use crate::ReportError;
 use crate::comparison::{comparison_sentence, difference_shown, moved_shown};
-use armcal_result::{Comparison, Difference, StoredRun, paired};
+use armcal_result::{Comparison, Difference, StoredRun, pair_dwells};
 use askama::Template;
 use serde_json::{Value, json};
 
@@ -25,7 +25,7 @@ pub fn comparison_html(
     let kicker = format!("{} against {}", with(&before.pipeline, own), with(&after.pipeline, other));
     let title = format!("{} and {}", before.pipeline, after.pipeline);
     let scripts = [embed::TEXT, embed::CHART, include_str!("assets/compared.js")];
-    let document = document(before, after, comparison);
+    let document = comparison_document(before, after, comparison);
     let shell = Shell::new("comparison-page", (title, kicker), &scripts, &document)?;
     Ok(ComparePage { shell: shell.saying(comparison_sentence(comparison)), comparison }.render()?)
 }
@@ -38,8 +38,8 @@ struct ComparePage<'a> {
 }
 
 /// What the page's scripts draw.
-fn document(before: &StoredRun, after: &StoredRun, comparison: &Comparison) -> Value {
-    let pairs = paired(before, after).pairs;
+fn comparison_document(before: &StoredRun, after: &StoredRun, comparison: &Comparison) -> Value {
+    let pairs = pair_dwells(before, after).pairs;
     let mut recordings: Vec<&str> = Vec::new();
     let rows = pairs.iter().map(|(earlier, r)| {
         let recording = recordings.iter().position(|known| *known == r.recording).unwrap_or_else(|| {

@@ -7,7 +7,7 @@ use armcal_model::find;
 use armcal_result::proto::ErrorCurve;
 use armcal_result::sensitivity::{Basis, Channel, Driver};
 use armcal_result::{Column, RecordingNames, Refit, Run};
-use armcal_wording::{channel_told, driver_told, sizes};
+use armcal_wording::{candidate_sizes, channel_told, driver_told};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -73,7 +73,7 @@ impl Document {
         let index_of = |effects: &[String]| all.iter().position(|r| r.effects == effects).map(|k| k + 1);
         let path = [0].into_iter().chain(run.steps.iter().filter_map(|s| index_of(&s.effects))).collect();
         let candidates =
-            run.diagnosis.iter().flat_map(|d| ranking(d, &run.recording_names(), &index_of)).collect();
+            run.diagnosis.iter().flat_map(|d| candidate_rows(d, &run.recording_names(), &index_of)).collect();
         Document {
             channels: basis.sensitivity.channels.clone(),
             drawn: drawn_drivers(basis),
@@ -81,9 +81,9 @@ impl Document {
             arrival: basis.arrival.clone(),
             recordings: run.recordings.iter().map(|r| r.name.clone()).collect(),
             begin_min: run.recorded_time().begins(),
-            told: told(run),
-            dwells: dwells(run),
-            boards: boards(run),
+            told: display_names(run),
+            dwells: dwell_columns(run),
+            boards: board_maps(run),
             refits,
             path,
             candidates,
@@ -95,7 +95,7 @@ impl Document {
 
 /// Every event that the page names, and every parameter of one, with its moment; what has no name, by where it enters and what
 /// it depends on.
-fn told(run: &Run) -> BTreeMap<String, String> {
+fn display_names(run: &Run) -> BTreeMap<String, String> {
     let ranked = run.diagnosis.iter().flat_map(|d| &d.candidates).map(|c| c.spec.clone());
     let refitted = run.refits().flat_map(|r| r.effects.iter().cloned());
     let calibrations = std::iter::once(&run.calibration).chain(run.refits().map(|r| &r.calibration));
@@ -112,7 +112,7 @@ fn told(run: &Run) -> BTreeMap<String, String> {
 }
 
 /// The best entries, and below them whatever was found.
-fn ranking(
+fn candidate_rows(
     d: &Diagnosis,
     names: &RecordingNames,
     index_of: &dyn Fn(&[String]) -> Option<usize>,
@@ -123,7 +123,7 @@ fn ranking(
         json!({
             "spec": c.spec,
             "summary": find(&c.effect).map_or("", |kind| kind.summary),
-            "size": sizes(c),
+            "size": candidate_sizes(c),
             "probability": c.standing.map(|s| s.probability),
             "behind_nats": c.standing.map(|s| s.behind_nats),
             "behind_se": c.standing.map(|s| s.behind_se),
@@ -141,7 +141,7 @@ fn ranking(
     best.chain(rest).map(row).collect()
 }
 
-fn dwells(run: &Run) -> Dwells {
+fn dwell_columns(run: &Run) -> Dwells {
     let marker = |o: &armcal_core::Observation| run.model.measured_name(o);
     let values = run.calibration.fit.values();
     let measured_m: Vec<_> =
@@ -171,7 +171,7 @@ fn dwells(run: &Run) -> Dwells {
     }
 }
 
-fn boards(run: &Run) -> Vec<Value> {
+fn board_maps(run: &Run) -> Vec<Value> {
     let Some(board) = &run.board else { return Vec::new() };
     let seen =
         |index: usize| run.observations.iter().any(|o| o.dwell.recording == index && o.cavity().is_some());

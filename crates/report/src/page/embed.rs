@@ -42,7 +42,7 @@ pub(crate) fn json_for_html(value: &impl Serialize) -> Result<String, ReportErro
 }
 
 /// The content security policy of a page that runs these scripts and no other, and talks to nobody.
-pub(crate) fn policy(scripts: &[&str]) -> String {
+pub(crate) fn content_security_policy(scripts: &[&str]) -> String {
     let hashes: Vec<String> = scripts
         .iter()
         .map(|s| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(s.as_bytes()))))

@@ -21,15 +21,15 @@ pub use compared::comparison_html;
 use crate::ReportError;
 use armcal_calibrate::Calibration;
 use armcal_core::ErrorStats;
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use armcal_diagnose::{FoundEffect, NotTestable};
 use armcal_result::by_marker::{MarkerErrors, by_marker};
 use armcal_result::sensitivity::Basis;
 use armcal_result::summary::Explanation;
 use armcal_result::{Refit, Run};
 use armcal_wording::{
-    Story, ToldWarning, WITH_CURVES, about, explanations, kind_of, nested_sentence, pasted, shown_unlisted,
-    sizes_of, unlisted,
+    Story, ToldWarning, WITH_CURVES, explanations, joined_tips_text, kind_of, nested_sentence,
+    shown_unlisted, sizes_of, unlisted_text, unlisted_toml,
 };
 use askama::Template;
 use document::Document;
@@ -65,16 +65,16 @@ const LIVE: [[&str; 2]; 2] = [
 pub fn report_html(run: &Run, basis: &Basis) -> Result<String, ReportError> {
     let story = Story::of(run);
     let title = run.pipeline_name.clone();
-    let about = about(run).map(|about| format!("{title} · {about}"));
+    let about = joined_tips_text(run).map(|about| format!("{title} · {about}"));
     let kicker = about.unwrap_or_else(|| title.clone());
     let shell = Shell::new("report-page", (title, kicker), &SCRIPTS, &Document::of(run, basis))?;
     let page = ReportPage {
         shell: shell.telling(&story),
         verdict: verdict(run),
         run,
-        recordings: quality::recordings(run),
+        recordings: quality::recording_rows(run),
         markers: by_marker(run),
-        rejections: quality::rejections(run),
+        rejections: quality::rejection_rows(run),
         next: &story.next,
         warnings: &story.warnings,
     };
@@ -124,13 +124,13 @@ fn verdict(run: &Run) -> Verdict {
     let Some(d) = &run.diagnosis else { return Verdict::default() };
     let names = run.recording_names();
     Verdict {
-        found: (d.effects.iter().map(|e| found(e, &fall(run, e))))
-            .chain(shown_unlisted(d).map(unlisted))
-            .chain(d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", found(e, ""))))
+        found: (d.effects.iter().map(|e| effect_sentences(e, &error_fall_text(run, e))))
+            .chain(shown_unlisted(d).map(unlisted_text))
+            .chain(d.beside_curves().iter().map(|e| format!("{WITH_CURVES}{}", effect_sentences(e, ""))))
             .chain(d.nested.iter().map(nested_sentence))
             .map(|said| run.in_words(&said))
             .collect(),
-        paste: shown_unlisted(d).map(pasted).filter(|table| !table.is_empty()).collect(),
+        paste: shown_unlisted(d).map(unlisted_toml).filter(|table| !table.is_empty()).collect(),
         same: d.cannot_tell_apart.iter().map(|pair| pair.each_ref().map(|name| names.label(name))).collect(),
         unseen: (d.not_testable.iter().cloned())
             .map(|n| NotTestable { effect: names.label(&n.effect), ..n })
@@ -145,7 +145,7 @@ fn verdict(run: &Run) -> Verdict {
 }
 
 /// A found effect in sentences, `fall` what it takes of the error.
-fn found(e: &FoundEffect, fall: &str) -> String {
+fn effect_sentences(e: &FoundEffect, fall: &str) -> String {
     let summary = kind_of(e).map_or(String::new(), |kind| format!(": {}", kind.summary));
     let set = if e.set.len() > 1 { format!(" (one of {})", e.set.join(", ")) } else { String::new() };
     let rival =
@@ -160,14 +160,14 @@ fn found(e: &FoundEffect, fall: &str) -> String {
 }
 
 /// How the error falls with an effect: that of the refits that the page shows, not that of the weighing.
-fn fall(run: &Run, e: &FoundEffect) -> String {
+fn error_fall_text(run: &Run, e: &FoundEffect) -> String {
     let step = run.steps.iter().position(|step| step.effects.last() == Some(&e.name));
     step.map_or(String::new(), |k| {
         let before = k.checked_sub(1).map_or(&run.calibration, |k| &run.steps[k].calibration);
         let after = &run.steps[k].calibration;
-        let mean = |c: &Calibration| millimetres(judged(c).mean_m);
-        let fitted = |c: &Calibration| millimetres(c.train.fitted.mean_m);
-        if judged(after).mean_m < judged(before).mean_m || !after.held_out() {
+        let mean = |c: &Calibration| format_mm(judged_errors(c).mean_m);
+        let fitted = |c: &Calibration| format_mm(c.train.fitted.mean_m);
+        if judged_errors(after).mean_m < judged_errors(before).mean_m || !after.held_out() {
             return format!(" With it the mean error goes from {} to {} mm.", mean(before), mean(after));
         }
         // Where a fold holds all that shows an effect, the fold cannot learn it.
@@ -182,6 +182,6 @@ fn fall(run: &Run, e: &FoundEffect) -> String {
 }
 
 /// Errors on points that the fit never saw, or on all where nothing was held out.
-fn judged(c: &Calibration) -> &ErrorStats {
+fn judged_errors(c: &Calibration) -> &ErrorStats {
     &c.judged().fitted
 }

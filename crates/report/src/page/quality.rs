@@ -1,6 +1,6 @@
 //! What the page's tables say about the data themselves.
 
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use armcal_recording::StreamReport;
 use armcal_result::{ObservedFile, RecordingErrors, RecordingRun, Run};
 
@@ -24,14 +24,13 @@ pub(crate) struct RejectionRow {
 }
 
 /// All recordings.
-pub(crate) fn recordings(run: &Run) -> Vec<RecordingRow<'_>> {
+pub(crate) fn recording_rows(run: &Run) -> Vec<RecordingRow<'_>> {
     let errors = run.errors_by_recording();
-    run.recordings.iter().zip(&errors).map(|(r, errors)| recording(run, r, errors)).collect()
+    run.recordings.iter().zip(&errors).map(|(r, errors)| recording_row(run, r, errors)).collect()
 }
 
-fn recording<'a>(run: &Run, of: &'a RecordingRun, errors: &RecordingErrors) -> RecordingRow<'a> {
-    let mean_mm =
-        |unseen| [errors.nominal, errors.calibrated, unseen].map(|e| millimetres(e.mean_m)).to_vec();
+fn recording_row<'a>(run: &Run, of: &'a RecordingRun, errors: &RecordingErrors) -> RecordingRow<'a> {
+    let mean_mm = |unseen| [errors.nominal, errors.calibrated, unseen].map(|e| format_mm(e.mean_m)).to_vec();
     let no_clock = || {
         let why = if of.earlier.is_some() { "–" } else { "one clock" };
         [why, "–"].map(str::to_owned)
@@ -41,11 +40,11 @@ fn recording<'a>(run: &Run, of: &'a RecordingRun, errors: &RecordingErrors) -> R
         used: run.used(of),
         mean_mm: errors.unseen.map(mean_mm).unwrap_or_default(),
         clock: of.clock_shown().unwrap_or_else(no_clock),
-        files: of.files().into_iter().enumerate().map(|(at, file)| (file, damage(of, at))).collect(),
+        files: of.files().into_iter().enumerate().map(|(at, file)| (file, damage_text(of, at))).collect(),
     }
 }
 
-fn damage(r: &RecordingRun, file: usize) -> String {
+fn damage_text(r: &RecordingRun, file: usize) -> String {
     match r.report.files.get(file).map(|f| (f.truncated_at, f.damaged.len())) {
         // Its own result says so.
         None => "–".into(),
@@ -70,7 +69,7 @@ pub(crate) fn dropped(s: &StreamReport) -> u64 {
 }
 
 /// Rejected dwells, by reason.
-pub(crate) fn rejections(run: &Run) -> Vec<RejectionRow> {
+pub(crate) fn rejection_rows(run: &Run) -> Vec<RejectionRow> {
     let mut rows: Vec<(String, String, Vec<String>)> = Vec::new();
     for r in &run.recordings {
         for rejection in &r.rejections {

@@ -57,7 +57,7 @@ impl Shell {
             version: VERSION,
             style: embed::STYLE,
             plotly: embed::PLOTLY,
-            policy: embed::policy(&[embed::PLOTLY, &script]),
+            policy: embed::content_security_policy(&[embed::PLOTLY, &script]),
             data: embed::json_for_html(document)?,
             script,
         })

@@ -2,7 +2,7 @@
 
 use armcal_calibrate::{Calibration, Estimate, PairedDifference, SideErrors};
 use armcal_core::ErrorStats;
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use armcal_model::Model;
 use armcal_result::sensitivity::{Band, Basis, Group, Signature, bands, drivers_of, groups, signatures};
 use armcal_result::{Column, Refit, Run, role_word};
@@ -57,7 +57,7 @@ impl Shown {
             Refit { effects: Vec::new(), model: run.model.clone(), calibration: run.calibration.clone() };
         let shown = Shown::of(run, basis, &own);
         // What it is worth on another day was asked of the run's own calibration alone.
-        Shown { sentence: shown.sentence + &pool_story::transfer(run), ..shown }
+        Shown { sentence: shown.sentence + &pool_story::transfer_sentence(run), ..shown }
     }
 
     /// Another calibration of the run's observations.
@@ -82,10 +82,10 @@ impl Shown {
             added: added.clone(),
             effects: effect_names(model),
             sentence: conclusion(calibration),
-            train: side(&calibration.train),
-            holdout: side(&calibration.holdout),
+            train: side_json(&calibration.train),
+            holdout: side_json(&calibration.holdout),
             noise_floor_mm: calibration.noise_floor_m * 1e3,
-            change: change(run, calibration),
+            change: change_json(run, calibration),
             held_out: calibration.residuals.iter().map(|r| u8::from(r.held_out)).collect(),
             error_mm: Column::of_all(error_mm),
             world_mm: [0, 1, 2].map(|axis| Column::of_all(residuals_m.iter().map(|r| r[axis] * 1e3))),
@@ -95,7 +95,7 @@ impl Shown {
             implied: implied.into_iter().map(Column::of).collect(),
             groups: groups(run, basis, &judged),
             signatures: signatures(run, basis, refit),
-            parameters: calibration.fit.estimates.iter().map(parameter).collect(),
+            parameters: calibration.fit.estimates.iter().map(parameter_json).collect(),
         }
     }
 }
@@ -112,7 +112,7 @@ pub(crate) fn effect_names(model: &Model) -> Vec<String> {
 }
 
 /// Errors of one side of the hold-out [mm], the mean also as people read it.
-fn side(errors: &SideErrors) -> Value {
+fn side_json(errors: &SideErrors) -> Value {
     let of = |stats: &ErrorStats| {
         (stats.n > 0).then(|| {
             json!({
@@ -120,7 +120,7 @@ fn side(errors: &SideErrors) -> Value {
                 "rms": stats.rms_m * 1e3,
                 "p95": stats.p95_m * 1e3,
                 "max": stats.max_m * 1e3,
-                "mean_text": millimetres(stats.mean_m),
+                "mean_text": format_mm(stats.mean_m),
             })
         })
     };
@@ -128,7 +128,7 @@ fn side(errors: &SideErrors) -> Value {
 }
 
 /// Paired difference to the run's own calibration [mm].
-fn change(run: &Run, after: &Calibration) -> Option<Value> {
+fn change_json(run: &Run, after: &Calibration) -> Option<Value> {
     let d = PairedDifference::between(&run.observations, &run.calibration, after)?;
     let mm = |m: f64| m * 1e3;
     Some(json!({
@@ -140,7 +140,7 @@ fn change(run: &Run, after: &Calibration) -> Option<Value> {
 }
 
 /// A parameter as the page shows it, in the unit for people.
-fn parameter(e: &Estimate) -> Value {
+fn parameter_json(e: &Estimate) -> Value {
     let p = &e.parameter;
     let [nominal, value, change, half] = estimate_shown(e);
     json!({

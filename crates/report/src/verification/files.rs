@@ -19,7 +19,7 @@ pub fn verification_json(v: &Verification) -> String {
         "pipeline": v.pipeline,
         "result": v.result.to_string_lossy(),
         "status": v.status(),
-        "conclusion": super::terminal::conclusion(v),
+        "conclusion": super::terminal::verification_conclusion(v),
         "effects": v.effects,
         "recordings": v.recordings,
         "told": v.told,

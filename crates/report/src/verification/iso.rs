@@ -1,7 +1,7 @@
 //! Criteria of ISO 9283 in the terminal: the worst place of each, and what the recordings cannot show.
 
-use crate::pen::{Pen, number};
-use armcal_core::printable;
+use crate::pen::{Pen, number_cell};
+use armcal_core::printable_name;
 use armcal_iso9283::{Criterion, NotMeasured};
 use armcal_result::IsoReport;
 use comfy_table::Cell;
@@ -24,16 +24,24 @@ pub(super) fn section(pen: &Pen, report: &IsoReport, none: &str) -> String {
     for row in rows(report) {
         let [clause, criterion, symbol, unit, nominal, calibrated, at, n, asked] = row;
         let mut cells: Vec<Cell> = [clause, criterion, symbol, unit].into_iter().map(Cell::new).collect();
-        cells.extend([number(nominal), number(calibrated), Cell::new(at), number(n), number(asked)]);
+        cells.extend([
+            number_cell(nominal),
+            number_cell(calibrated),
+            Cell::new(at),
+            number_cell(n),
+            number_cell(asked),
+        ]);
         table.add_row(cells);
     }
     let mut text = pen.render(&table);
     if !report.commands_recorded {
         text.push_str(&format!(" {STAND_IN}\n"));
     }
-    let notes = report.calibrated.notes.iter().map(|note| ("note", printable(note)));
+    let notes = report.calibrated.notes.iter().map(|note| ("note", printable_name(note)));
     text.push_str(&pen.list(notes));
-    text.push_str(&pen.list(missing(&report.calibrated.not_measured).into_iter().map(|m| ("no", m))));
+    text.push_str(
+        &pen.list(unmeasured_criteria(&report.calibrated.not_measured).into_iter().map(|m| ("no", m))),
+    );
     pen.section(title, text)
 }
 
@@ -47,9 +55,9 @@ pub(super) fn rows(report: &IsoReport) -> Vec<[String; 9]> {
             c.name.clone(),
             c.symbol.clone(),
             c.quantity.display_symbol().to_string(),
-            before.map_or("-".into(), |n| shown(n)),
-            shown(c),
-            printable(&c.at),
+            before.map_or("-".into(), |n| criterion_text(n)),
+            criterion_text(c),
+            printable_name(&c.at),
             c.n.to_string(),
             c.asked.to_string(),
         ]
@@ -60,13 +68,15 @@ pub(super) fn rows(report: &IsoReport) -> Vec<[String; 9]> {
 /// What the criteria need to be read rightly, and which cannot be computed.
 pub(super) fn remarks(report: &IsoReport) -> Vec<String> {
     let stand_in = (!report.commands_recorded).then(|| STAND_IN.to_owned());
-    let notes = report.calibrated.notes.iter().map(|note| printable(note));
-    let missing = missing(&report.calibrated.not_measured).into_iter().map(|m| format!("not measured: {m}"));
+    let notes = report.calibrated.notes.iter().map(|note| printable_name(note));
+    let missing = unmeasured_criteria(&report.calibrated.not_measured)
+        .into_iter()
+        .map(|m| format!("not measured: {m}"));
     stand_in.into_iter().chain(notes).chain(missing).collect()
 }
 
 /// What cannot be computed, criteria with one reason together.
-fn missing(all: &[NotMeasured]) -> Vec<String> {
+fn unmeasured_criteria(all: &[NotMeasured]) -> Vec<String> {
     let mut reasons: Vec<(&str, Vec<String>)> = Vec::new();
     for m in all {
         let symbol = if m.symbol.is_empty() { m.name.clone() } else { m.symbol.clone() };
@@ -76,10 +86,10 @@ fn missing(all: &[NotMeasured]) -> Vec<String> {
             None => reasons.push((&m.reason, vec![named])),
         }
     }
-    reasons.iter().map(|(reason, names)| printable(&format!("{}: {reason}", names.join(", ")))).collect()
+    reasons.iter().map(|(reason, names)| printable_name(&format!("{}: {reason}", names.join(", ")))).collect()
 }
 
-fn shown(c: &Criterion) -> String {
+fn criterion_text(c: &Criterion) -> String {
     let sign = if c.plus_minus { "±" } else { "" };
     format!("{sign}{:.3}", c.display_value())
 }

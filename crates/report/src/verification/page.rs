@@ -1,7 +1,7 @@
 //! The page of `armcal verify`: the tables, and the source paper's figures 6, 7 and 10 for the longest motions.
 
 use super::row::Row;
-use super::terminal::conclusion;
+use super::terminal::verification_conclusion;
 use super::{iso, no_criteria, points_are};
 use crate::ReportError;
 use crate::page::embed;
@@ -27,14 +27,14 @@ pub fn verification_html(v: &Verification) -> Result<String, ReportError> {
     let names = (format!("{}, verified", v.pipeline), format!("{} · model: geometry{effects}", v.pipeline));
     let scripts = [embed::TEXT, embed::CHART, include_str!("../page/assets/verified.js")];
     // What the page's script draws.
-    let document = json!({ "motions": motions(&v.samples) });
+    let document = json!({ "motions": longest_motions(&v.samples) });
     let shell = Shell::new("verification-page", names, &scripts, &document)?;
     let recordings = RecordingNames::new(v.recordings.iter().map(|r| r.name.clone()));
     let told = v.warnings.iter().map(|w| ToldWarning::new(&recordings, None, w)).collect();
     let page = VerificationPage {
         shell: Shell {
             status: Some((v.status(), status_sentence(v.status()).to_owned())),
-            ..shell.saying(conclusion(v))
+            ..shell.saying(verification_conclusion(v))
         },
         tables: vec![
             (points_are(v), v.points.iter().map(point_row).collect()),
@@ -102,18 +102,18 @@ impl From<Row> for Shown {
 }
 
 /// The longest motions, the longest first, thinned evenly.
-fn motions(samples: &[PathSample]) -> Value {
+fn longest_motions(samples: &[PathSample]) -> Value {
     let same = |a: &PathSample, b: &PathSample| a.recording == b.recording && a.motion == b.motion;
     let length_m = |motion: &[PathSample]| -> f64 {
         motion.windows(2).map(|w| (w[1].calibrated_m - w[0].calibrated_m).norm()).sum()
     };
     let mut all: Vec<&[PathSample]> = samples.chunk_by(same).filter(|m| m.len() > 2).collect();
     all.sort_by(|a, b| length_m(b).total_cmp(&length_m(a)));
-    all.into_iter().take(MOTIONS).map(drawn).collect()
+    all.into_iter().take(MOTIONS).map(motion_json).collect()
 }
 
 /// One motion, in millimetres and seconds.
-fn drawn(motion: &[PathSample]) -> Value {
+fn motion_json(motion: &[PathSample]) -> Value {
     let stride = motion.len().div_ceil(POINTS).max(1);
     let shown: Vec<&PathSample> = motion.iter().step_by(stride).collect();
     // A hundredth of a millimetre is below what any of it is worth, and the page stays small.

@@ -1,6 +1,6 @@
 //! One row of a verification's tables in words and millimetres, the same on terminal and page.
 
-use armcal_core::units::millimetres;
+use armcal_core::units::format_mm;
 use armcal_verify::{By, Compared, Estimate, PathRow, Plane, PointsRow};
 
 /// Cells of a row; empty where a number would say nothing.
@@ -40,15 +40,14 @@ impl Row {
     }
 
     fn of(subject: String, c: &Compared) -> Row {
-        let half =
-            |e: &Estimate| e.ci95_m.map_or(String::new(), |[low, high]| millimetres(0.5 * (high - low)));
-        let mean = |e: &Estimate| [millimetres(e.mean_m), half(e)];
+        let half = |e: &Estimate| e.ci95_m.map_or(String::new(), |[low, high]| format_mm(0.5 * (high - low)));
+        let mean = |e: &Estimate| [format_mm(e.mean_m), half(e)];
         Row {
             subject,
             n: c.n,
             before: mean(&c.before),
             after: mean(&c.after),
-            difference: c.difference_ci95_m.map_or_else(Default::default, |ends| ends.map(millimetres)),
+            difference: c.difference_ci95_m.map_or_else(Default::default, |ends| ends.map(format_mm)),
             better: format!("{:.1} %", 100.0 * c.improvement),
         }
     }

@@ -5,7 +5,7 @@ use crate::recording::{get, own, read, string, write};
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_config::InputMessages;
 use armcal_core::{Severity, Stage, Warning};
-use armcal_report::{Detail, TerminalStyle, report_html, summary_json, terminal};
+use armcal_report::{Detail, TerminalStyle, report_html, run_text, summary_json};
 use armcal_result::Status;
 use armcal_result::sensitivity::Basis;
 
@@ -28,8 +28,8 @@ fn said(s: &Synthetic, folder: &str) -> (String, Vec<String>) {
         .collect();
     let page = flat(&std::fs::read_to_string(out.join("report.html")).unwrap());
     let header = page.split("</header>").next().unwrap().to_owned();
-    let everything = flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything));
-    let brief = flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Story));
+    let everything = flat(&run_text(&s.run, TerminalStyle::Plain, Detail::Everything));
+    let brief = flat(&run_text(&s.run, TerminalStyle::Plain, Detail::Story));
     for line in &lines {
         // The terminal sets the label in a column of its own, as the list of what was found its dash. What a panel has no room
         // for, it has elsewhere than the terminal.
@@ -78,7 +78,7 @@ fn people_are_told_names_of_recordings_and_programs_their_indices() {
     let told = "dwell 5 of `normal` (cavity a): frame_shift in `normal` (frame_shift@0) and tool_shift from dwell 4 of `roll` on \
                 (tool_shift@1.4) tell of it";
     said(&s, "named");
-    assert!(flat(&terminal(&s.run, TerminalStyle::Plain, Detail::Everything)).contains(told));
+    assert!(flat(&run_text(&s.run, TerminalStyle::Plain, Detail::Everything)).contains(told));
     let page = report_html(&s.run, &Basis::of(&s.run)).unwrap();
     let [subject_told, message_told] = told.split_once(": ").map(|(a, b)| [a, b]).unwrap();
     assert!(flat(&page).contains(&format!("<td>{subject_told}</td><td>{message_told}</td>")));

@@ -1,19 +1,19 @@
 use crate::synthetic::{HOSTILE, synthetic};
 use armcal_core::Severity;
-use armcal_report::{Detail, TerminalStyle, terminal};
+use armcal_report::{Detail, TerminalStyle, run_text};
 use armcal_wording::conclusion;
 
 #[test]
 fn what_a_person_reads() {
     let s = synthetic();
-    insta::assert_snapshot!(terminal(&s.run, TerminalStyle::Plain, Detail::Everything));
+    insta::assert_snapshot!(run_text(&s.run, TerminalStyle::Plain, Detail::Everything));
 }
 
 #[test]
 fn what_decides_fits_on_a_screen_and_ends_with_verdict_status_and_next_step() {
     let s = synthetic();
-    let story = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
-    let everything = terminal(&s.run, TerminalStyle::Plain, Detail::Everything);
+    let story = run_text(&s.run, TerminalStyle::Plain, Detail::Story);
+    let everything = run_text(&s.run, TerminalStyle::Plain, Detail::Everything);
     assert!(story.lines().count() < 38, "{story}");
     let at = |text: &str, what: &str| text.find(what).unwrap_or_else(|| panic!("no {what:?} in {text}"));
     for text in [&story, &everything] {
@@ -39,10 +39,10 @@ fn many_recordings_do_not_push_the_verdict_off_the_screen() {
     let mut s = synthetic();
     let one = s.run.recordings[0].clone();
     s.run.recordings.resize(40, one);
-    let story = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
+    let story = run_text(&s.run, TerminalStyle::Plain, Detail::Story);
     assert!(story.lines().count() < 38, "{story}");
     assert!(story.contains("and 36 more (`-v` lists them)"), "{story}");
-    let everything = terminal(&s.run, TerminalStyle::Plain, Detail::Everything);
+    let everything = run_text(&s.run, TerminalStyle::Plain, Detail::Everything);
     assert!(!everything.contains("and 36 more"), "{everything}");
 }
 
@@ -50,14 +50,14 @@ fn many_recordings_do_not_push_the_verdict_off_the_screen() {
 fn where_nothing_is_left_out_nothing_is_said_to_be() {
     let mut s = synthetic();
     s.run.calibration.fit.estimates.iter_mut().for_each(|e| e.parameter.free = false);
-    let said = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
+    let said = run_text(&s.run, TerminalStyle::Plain, Detail::Story);
     assert!(!said.contains("parameters fitted") && said.contains(" notice"), "{said}");
     s.run.warnings.clear();
     s.run.calibration.warnings.clear();
     s.run.calibration.fit.warnings.clear();
     s.run.recordings.clear();
     assert_eq!(s.run.overall_warnings(), []);
-    let said = terminal(&s.run, TerminalStyle::Plain, Detail::Story);
+    let said = run_text(&s.run, TerminalStyle::Plain, Detail::Story);
     assert!(!said.contains("lists them"), "{said}");
 }
 
@@ -65,7 +65,7 @@ fn where_nothing_is_left_out_nothing_is_said_to_be() {
 fn it_fits_100_columns_and_obeys_no_control_characters_of_names() {
     let s = synthetic();
     let [plain, story] =
-        [Detail::Everything, Detail::Story].map(|detail| terminal(&s.run, TerminalStyle::Plain, detail));
+        [Detail::Everything, Detail::Story].map(|detail| run_text(&s.run, TerminalStyle::Plain, detail));
     for line in plain.lines().chain(story.lines()) {
         assert!(line.chars().count() <= 100, "{line}");
     }
@@ -77,8 +77,8 @@ fn it_fits_100_columns_and_obeys_no_control_characters_of_names() {
 fn colour_adds_nothing_but_colour() {
     let s = synthetic();
     let (plain, colour) = (
-        terminal(&s.run, TerminalStyle::Plain, Detail::Everything),
-        terminal(&s.run, TerminalStyle::Colour, Detail::Everything),
+        run_text(&s.run, TerminalStyle::Plain, Detail::Everything),
+        run_text(&s.run, TerminalStyle::Colour, Detail::Everything),
     );
     let mut rest = colour.as_str();
     let mut without = String::new();

@@ -2,7 +2,7 @@
 
 use crate::points::{Point, extent};
 use crate::proto::BoardErrors;
-use crate::proto::count;
+use crate::proto::saturating_u32;
 use crate::run::Run;
 use armcal_core::Pose;
 use armcal_core::robust::percentile;
@@ -23,24 +23,30 @@ pub fn board_errors(run: &Run, points: &[Point], in_time: &[usize]) -> Vec<Board
         let own: Vec<&Point> = in_time
             .iter()
             .map(|&i| &points[i])
-            .filter(|p| p.observation.dwell.recording == index && drawable(p))
+            .filter(|p| p.observation.dwell.recording == index && is_drawable(p))
             .collect();
-        (!own.is_empty()).then(|| recording(run, index, &own, &board, magnification))
+        (!own.is_empty()).then(|| recording_board_errors(run, index, &own, &board, magnification))
     };
     (0..run.recordings.len()).filter_map(of_recording).collect()
 }
 
 /// A seated tip whose residuals are numbers.
-fn drawable(p: &Point) -> bool {
+fn is_drawable(p: &Point) -> bool {
     let numbers =
         p.steps_m.iter().chain([&p.residual.nominal_m, &p.residual.fitted_m]).flat_map(Vector3::iter);
     p.observation.cavity().is_some() && numbers.copied().all(f64::is_finite)
 }
 
-fn recording(run: &Run, index: usize, own: &[&Point], board: &Pose, magnification: f64) -> BoardErrors {
+fn recording_board_errors(
+    run: &Run,
+    index: usize,
+    own: &[&Point],
+    board: &Pose,
+    magnification: f64,
+) -> BoardErrors {
     let mut m = BoardErrors {
         recording: run.recordings[index].name.clone(),
-        recording_index: count(index),
+        recording_index: saturating_u32(index),
         magnification,
         ..Default::default()
     };
@@ -49,7 +55,7 @@ fn recording(run: &Run, index: usize, own: &[&Point], board: &Pose, magnificatio
             continue;
         };
         m.cavity.push(cavity.to_owned());
-        m.dwell.push(count(p.observation.dwell.dwell));
+        m.dwell.push(saturating_u32(p.observation.dwell.dwell));
         m.x_mm.push(in_board_m.x * 1e3);
         m.y_mm.push(in_board_m.y * 1e3);
         let in_board_mm = |world_m: &Vector3<f64>| board.rotation.inverse() * world_m * 1e3;
@@ -78,7 +84,7 @@ fn magnification(run: &Run, points: &[Point]) -> f64 {
         let board = run.model.board_in_world(&fitted, p.observation.dwell.recording)?;
         Some((board.rotation.inverse() * p.residual.fitted_m).xy().norm())
     };
-    let errors_m: Vec<f64> = points.iter().filter(|p| drawable(p)).filter_map(along_m).collect();
+    let errors_m: Vec<f64> = points.iter().filter(|p| is_drawable(p)).filter_map(along_m).collect();
     let cavities = run.board.iter().flat_map(|b| &b.cavities);
     let places: Vec<Vector3<f64>> = cavities.map(|c| c.in_board_m).collect();
     let nearest = |i: usize| {

@@ -3,7 +3,7 @@
 use super::course::recorded_min;
 use crate::points::Point;
 use crate::proto::JointErrors;
-use crate::proto::count;
+use crate::proto::saturating_u32;
 use crate::run::Run;
 use armcal_calibrate::{BLURRED, ImpliedError, implied_joint_errors};
 use armcal_core::robust::median;
@@ -84,11 +84,11 @@ pub fn joint_errors(
         })
         .collect();
     let time_min = recorded_min(run, points);
-    let of_joint = |j: usize| joint(run, j, points, in_time, &seen, (&time_min, &torques_nm[j]));
+    let of_joint = |j: usize| errors_of_joint(run, j, points, in_time, &seen, (&time_min, &torques_nm[j]));
     (0..run.model.joint_count()).map(of_joint).collect()
 }
 
-fn joint(
+fn errors_of_joint(
     run: &Run,
     j: usize,
     points: &[Point],
@@ -107,9 +107,9 @@ fn joint(
     let unit = run.model.chain().joint_unit(j);
     let mut m = JointErrors {
         joint: run.model.chain().joint_names()[j].clone(),
-        number: count(j + 1),
+        number: saturating_u32(j + 1),
         unit: unit.display_symbol().into(),
-        left_out: count(points.len() - drawn.len()),
+        left_out: saturating_u32(points.len() - drawn.len()),
         effort_nm: drawn.iter().filter_map(|&i| points[i].observation.effort_of(j)).collect(),
         ..Default::default()
     };
@@ -119,8 +119,8 @@ fn joint(
     for i in drawn {
         let Some((before, after, effect)) = sharp(i) else { continue };
         let o = points[i].observation;
-        m.recording_index.push(count(o.dwell.recording));
-        m.dwell.push(count(o.dwell.dwell));
+        m.recording_index.push(saturating_u32(o.dwell.recording));
+        m.dwell.push(saturating_u32(o.dwell.dwell));
         m.reading.push(unit.to_display(o.joint_rad[j]));
         m.torque_nm.push(super::or_zero(torque_nm[i]));
         m.time_min.push(time_min[i]);

@@ -32,7 +32,7 @@ pub fn finite(value: f64) -> Option<f64> {
 
 /// Four significant digits, whole numbers at least: tables of viewers show every digit a number has. By its decimal digits,
 /// because powers of ten above 22 are no floating-point numbers.
-pub fn short(value: f64) -> f64 {
+pub fn round_significant(value: f64) -> f64 {
     let exponent = value.abs().log10().floor();
     if !exponent.is_finite() {
         return value;
@@ -52,8 +52,9 @@ mod tests {
 
     #[test]
     fn numbers_of_tables_have_four_digits() {
-        let shown = [24.342_778_184, 0.131_249_9, -20.892_246, 123_456.7, 1e-7 / 3.0, 0.0].map(short);
+        let shown =
+            [24.342_778_184, 0.131_249_9, -20.892_246, 123_456.7, 1e-7 / 3.0, 0.0].map(round_significant);
         assert_eq!(shown, [24.34, 0.1312, -20.89, 123_457.0, 3.333e-8, 0.0]);
-        assert!(short(f64::NAN).is_nan() && short(f64::INFINITY).is_infinite());
+        assert!(round_significant(f64::NAN).is_nan() && round_significant(f64::INFINITY).is_infinite());
     }
 }

@@ -1,6 +1,6 @@
 //! The falling error: nominal, calibrated, and with each effect that the diagnosis found.
 
-use crate::proto::count;
+use crate::proto::saturating_u32;
 use crate::proto::{Step, Steps};
 use crate::recording_names::RecordingNames;
 use crate::run::Run;
@@ -26,12 +26,12 @@ pub fn steps(run: &Run) -> Steps {
         .iter()
         .zip(before)
         .enumerate()
-        .map(|(n, ((adds, e), before))| step(n, adds, e, before))
+        .map(|(n, ((adds, e), before))| error_step(n, adds, e, before))
         .collect();
     Steps {
         timestamp: None,
         steps,
-        noise_floor_mm: super::short(super::or_zero(calibration.noise_floor_m * 1e3)),
+        noise_floor_mm: super::round_significant(super::or_zero(calibration.noise_floor_m * 1e3)),
         held_out,
     }
 }
@@ -52,17 +52,17 @@ pub fn effects_label(names: &RecordingNames, effects: &[String]) -> String {
     curves.into_iter().chain(others).collect::<Vec<_>>().join(" + ")
 }
 
-fn step(number: usize, adds: &str, e: &ErrorStats, before_m: Option<f64>) -> Step {
+fn error_step(number: usize, adds: &str, e: &ErrorStats, before_m: Option<f64>) -> Step {
     let falls = before_m.filter(|b| *b > 0.0).map_or(0.0, |b| 100.0 * (b - e.mean_m) / b);
-    let mm = |m: f64| super::short(super::or_zero(m * 1e3));
+    let mm = |m: f64| super::round_significant(super::or_zero(m * 1e3));
     Step {
-        number: count(number),
+        number: saturating_u32(number),
         adds: adds.to_owned(),
         mean_mm: mm(e.mean_m),
         rms_mm: mm(e.rms_m),
         p95_mm: mm(e.p95_m),
         max_mm: mm(e.max_m),
-        falls_by_percent: super::short(super::or_zero(falls)),
+        falls_by_percent: super::round_significant(super::or_zero(falls)),
     }
 }
 

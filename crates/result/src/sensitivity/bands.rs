@@ -61,7 +61,7 @@ pub fn bands_over(basis: &Basis, channel: usize, key: &str, implied: &[Option<f6
     for direction in directions {
         let of_it = |i: usize| direction.is_none_or(|d| joint.is_some_and(|j| basis.arrival[j][i] == d));
         let points = (0..implied.len()).filter(|i| of_it(*i)).filter_map(|i| Some((x[i]?, implied[i]?)));
-        let [x, mean, half] = binned(points.collect(), cuts);
+        let [x, mean, half] = bin_means(points.collect(), cuts);
         if !x.is_empty() {
             let (x, mean, half) = (Column::of(x), Column::of(mean), Column::of(half));
             all.push(Band { channel, driver: key.to_owned(), direction, x, mean, half });
@@ -72,7 +72,7 @@ pub fn bands_over(basis: &Basis, channel: usize, key: &str, implied: &[Option<f6
 
 /// Bins of as many points each, never parting equal drivers nor reaching across a gap or a cut: mean driver, mean, half of its 95 %
 /// interval. `None` stands for a gap, so that no line leads across.
-fn binned(mut points: Vec<(f64, f64)>, cuts: &[f64]) -> [Vec<Option<f64>>; 3] {
+fn bin_means(mut points: Vec<(f64, f64)>, cuts: &[f64]) -> [Vec<Option<f64>>; 3] {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let range = points.last().map_or(0.0, |last| last.0 - points[0].0);
     let size = points.len().div_ceil(BINS).max(POINTS);
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn bins_hold_equal_shares_and_their_interval_is_students() {
         let points: Vec<(f64, f64)> = (0..12).rev().map(|i| (f64::from(i), f64::from(i % 6))).collect();
-        let [x, mean, half] = binned(points, &[]);
+        let [x, mean, half] = bin_means(points, &[]);
         assert_eq!((x, mean), (vec![Some(2.5), Some(8.5)], vec![Some(2.5), Some(2.5)]));
         // t(0.975, 5) * sd / sqrt(6), sd of 0..5 = 1.8708.
         assert!((half[0].expect("interval") - 2.570_582 * 1.870_829 / 6f64.sqrt()).abs() < 1e-5);
@@ -121,26 +121,26 @@ mod tests {
     #[test]
     fn equal_drivers_stay_in_one_bin() {
         let points = (0..30).map(|i| (f64::from(i / 20), 1.0)).collect();
-        let [x, ..] = binned(points, &[]);
+        let [x, ..] = bin_means(points, &[]);
         assert_eq!(x, [Some(0.0), None, Some(1.0)]);
     }
 
     #[test]
     fn no_bin_reaches_across_a_gap() {
         let points = (0..21).map(|i| (f64::from(i) + if i < 9 { 0.0 } else { 50.0 }, 1.0)).collect();
-        let [x, ..] = binned(points, &[]);
+        let [x, ..] = bin_means(points, &[]);
         assert_eq!(x, [Some(4.0), None, Some(61.5), Some(67.5)]);
     }
 
     #[test]
     fn no_bin_reaches_across_a_cut() {
         let points = (0..18).map(|i| (f64::from(i), 1.0)).collect();
-        let [x, ..] = binned(points, &[8.5]);
+        let [x, ..] = bin_means(points, &[8.5]);
         assert_eq!(x, [Some(4.0), None, Some(13.0)]);
     }
 
     #[test]
     fn few_points_have_no_bin() {
-        assert!(binned(vec![(0.0, 1.0); 3], &[])[0].is_empty());
+        assert!(bin_means(vec![(0.0, 1.0); 3], &[])[0].is_empty());
     }
 }

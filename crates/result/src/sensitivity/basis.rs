@@ -123,12 +123,12 @@ fn drivers(run: &Run) -> Vec<Driver> {
     let elsewhere = run.observations.iter().any(|o| !o.more_loads.is_empty());
     let label = if elsewhere { "all loads on the arm [kg]" } else { "load at the tip [kg]" };
     all.push(whole("load", label, Column::of_all(run.observations.iter().map(|o| o.all_loads_kg()))));
-    all.retain(varies);
+    all.retain(is_varying);
     all
 }
 
 /// Whether a driver moves at all; a joint's angle and time always belong on an axis.
-fn varies(driver: &Driver) -> bool {
+fn is_varying(driver: &Driver) -> bool {
     let size = driver.values.0.iter().flatten().fold(0.0, |size: f64, v| size.max(v.abs()));
     driver.key == "time" || driver.key.starts_with('q') || spread(driver) > SMALLEST_SPREAD * size
 }

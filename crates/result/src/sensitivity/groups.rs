@@ -37,7 +37,9 @@ pub fn groups(run: &Run, basis: &Basis, error_mm: &[Option<f64>]) -> Vec<Group> 
     }
     let measured: BTreeMap<_, _> = run.observations.iter().map(|o| (o.what(), o)).collect();
     for (what, o) in measured.into_iter().filter(|_| is_told(run)) {
-        all.extend(table.group("marker", by_marker::name(run, o), |i| run.observations[i].what() == what));
+        all.extend(
+            table.group("marker", by_marker::marker_name(run, o), |i| run.observations[i].what() == what),
+        );
     }
     let names = run.model.chain().joint_names();
     for (j, name) in names.iter().enumerate() {

@@ -53,7 +53,8 @@ impl Sensitivities {
         for o in &run.observations {
             let row =
                 joint_sensitivities(run, &values, o).into_iter().chain([length_sensitivity(run, &values, o)]);
-            for (sensitivity, all) in row.chain((0..3).map(|axis| Some(along(axis, o)))).zip(&mut sensitivity)
+            for (sensitivity, all) in
+                row.chain((0..3).map(|axis| Some(axis_sensitivity(axis, o)))).zip(&mut sensitivity)
             {
                 all.push(sensitivity);
             }
@@ -136,7 +137,7 @@ fn length_sensitivity(run: &Run, values: &[f64], o: &Observation) -> Option<Sens
 }
 
 /// Millimetres along an axis of the world.
-fn along(axis: usize, o: &Observation) -> Sensitivity {
+fn axis_sensitivity(axis: usize, o: &Observation) -> Sensitivity {
     let unit = Vector3::ith(axis, 1.0);
     let sigma = o.covariance_m2[(axis, axis)].sqrt() * 1e3;
     Sensitivity { gain: unit * 1e3, column_m: unit * 1e-3, sigma }

@@ -45,10 +45,10 @@ pub struct Signature {
 
 /// The signatures of all effects of a refitted model that move the tip.
 pub fn signatures(run: &Run, basis: &Basis, refit: &Refit) -> Vec<Signature> {
-    refit.model.effects().iter().filter_map(|effect| signature(run, basis, refit, effect)).collect()
+    refit.model.effects().iter().filter_map(|effect| effect_signature(run, basis, refit, effect)).collect()
 }
 
-fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> Option<Signature> {
+fn effect_signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> Option<Signature> {
     let with = refit.calibration.fit.values();
     let mut without = with.clone();
     let start = effect.parameters.start;
@@ -66,12 +66,12 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
     // Any channel alone stands for what is off along one direction: there the shares say nothing of them.
     let scalars = run.observations.iter().filter(|o| o.is_scalar()).count();
     let preference = if 2 * scalars > run.observations.len() { 1.0 } else { PREFERENCE };
-    let (channel, share) = channel(basis, &difference_m, (effect.spec.target, preference))?;
+    let (channel, share) = best_channel(basis, &difference_m, (effect.spec.target, preference))?;
     let effect_is = basis.sensitivity.implied(channel, &difference_m);
     let driver = match effect.spec.since {
         // What else changed at that moment, the temperature for one, is no cause of an event.
         Some(_) => basis.driver("time"),
-        None => driver(basis, channel, effect.kind.family, &effect_is),
+        None => best_driver(basis, channel, effect.kind.family, &effect_is),
     }?;
     let residuals = refit.calibration.residuals.iter().zip(&difference_m);
     let partial_m: Vec<Vector3<f64>> = residuals.map(|(r, d)| r.fitted_m + d).collect();
@@ -79,7 +79,7 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
     let key = &basis.drivers[driver].key;
     Some(Signature {
         effect: effect.spec.to_string(),
-        summary: summary(run, effect),
+        summary: effect_summary(run, effect),
         channel,
         driver: key.clone(),
         share,
@@ -90,7 +90,7 @@ fn signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffect) -> 
 }
 
 /// One line about an effect; a formula that a user did not write is one that the diagnosis proposes.
-fn summary(run: &Run, effect: &PlacedEffect) -> &'static str {
+fn effect_summary(run: &Run, effect: &PlacedEffect) -> &'static str {
     let own = run.model.effects().iter().any(|e| e.spec == effect.spec);
     match effect.kind.family {
         Family::User if !own => "a formula with the shape of what no listed effect explains",
@@ -99,7 +99,7 @@ fn summary(run: &Run, effect: &PlacedEffect) -> &'static str {
 }
 
 /// The channel that alone stands for most of the displacements; the effect's own joint where that is as good but for so much.
-fn channel(
+fn best_channel(
     basis: &Basis,
     difference_m: &[Vector3<f64>],
     (target, preference): (Option<usize>, f64),
@@ -113,20 +113,25 @@ fn channel(
 
 /// The driver over which the effect scatters least within a bin and a direction of arrival; what gives way is looked at over
 /// torque first.
-fn driver(basis: &Basis, channel: usize, family: Family, effect: &[Option<f64>]) -> Option<usize> {
+fn best_driver(basis: &Basis, channel: usize, family: Family, effect: &[Option<f64>]) -> Option<usize> {
     let joint = basis.sensitivity.channels[channel].joint;
     let own = |key: &str| joint.and_then(|j| basis.driver(&format!("{key}{}", j + 1)));
     let [one, other] = if family == Family::Elasticity { ["tau", "q"] } else { ["q", "tau"] };
     let first = [own(one), own(other), basis.driver("temperature"), basis.driver("time")];
     let mut order: Vec<usize> = first.into_iter().flatten().collect();
     order.extend((0..basis.drivers.len()).filter(|d| !order.contains(d)).collect::<Vec<_>>());
-    let left: Vec<f64> = order.iter().map(|d| scatter(basis, joint, *d, effect)).collect();
+    let left: Vec<f64> = order.iter().map(|d| residual_variance_ratio(basis, joint, *d, effect)).collect();
     let best = left.iter().copied().fold(f64::INFINITY, f64::min);
     order.into_iter().zip(left).find(|(_, left)| *left <= best + TIE).map(|(driver, _)| driver)
 }
 
 /// Share of the effect's variance that straight pieces over a driver leave, each direction by itself.
-fn scatter(basis: &Basis, joint: Option<usize>, driver: usize, effect: &[Option<f64>]) -> f64 {
+fn residual_variance_ratio(
+    basis: &Basis,
+    joint: Option<usize>,
+    driver: usize,
+    effect: &[Option<f64>],
+) -> f64 {
     let x = &basis.drivers[driver].values.0;
     let direction = |i: usize| joint.map_or(0, |j| basis.arrival[j][i]);
     let points: Vec<(i8, f64, f64)> =

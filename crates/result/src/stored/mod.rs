@@ -4,7 +4,7 @@ mod model;
 mod observations;
 mod run;
 
-pub use model::{model_of, open_model, visited};
+pub use model::{model_of, open_model, visited_intervals};
 pub use observations::{
     BoardFacts, OBSERVATIONS_FILE, ObservedRecording, StartFrame, StoredObservations, observations_json,
 };

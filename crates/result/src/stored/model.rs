@@ -77,10 +77,10 @@ pub fn model_of(run: &Run) -> Result<StoredModel, ResultError> {
         effects: model.effects().iter().map(|effect| EffectTable::from(&effect.spec)).collect(),
         session: run.session.clone(),
         parameters: shared.map(value).collect(),
-        recordings: recordings.map(|(i, r)| recording(r, i, run)).collect(),
-        postures_rad: thinned(&run.observations),
-        range_rad: (0..model.joint_count()).map(|j| range(&run.observations, j)).collect(),
-        visited: visited(model, &run.observations),
+        recordings: recordings.map(|(i, r)| recording_facts(r, i, run)).collect(),
+        postures_rad: thin_postures(&run.observations),
+        range_rad: (0..model.joint_count()).map(|j| joint_range(&run.observations, j)).collect(),
+        visited: visited_intervals(model, &run.observations),
         mean_error_m: Some(judged.fitted.mean_m).filter(|mean| mean.is_finite()),
         missing: missing.iter().map(EffectSpec::to_string).collect(),
     })
@@ -92,16 +92,20 @@ pub fn model_of(run: &Run) -> Result<StoredModel, ResultError> {
 /// A file that cannot be read, or holds no model in this format.
 pub fn open_model(path: &Path) -> Result<StoredModel, StoredResultError> {
     let path = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
-    let text = if path.extension().is_some_and(|e| e == "mcap") { attached(&path)? } else { file(&path)? };
+    let text = if path.extension().is_some_and(|e| e == "mcap") {
+        attached_model_text(&path)?
+    } else {
+        model_file_text(&path)?
+    };
     let bad = |why: String| StoredResultError::BadModel { path: path.clone(), why };
     StoredModel::from_json(&text).map_err(|e| bad(e.to_string()))
 }
 
-fn file(path: &Path) -> Result<String, StoredResultError> {
+fn model_file_text(path: &Path) -> Result<String, StoredResultError> {
     stored_text(path, |why| StoredResultError::NoModel { path: path.to_owned(), why })
 }
 
-fn attached(path: &Path) -> Result<String, StoredResultError> {
+fn attached_model_text(path: &Path) -> Result<String, StoredResultError> {
     let why = || format!("it has no attachment armcal/{FILE}");
     let [text] = attached_texts(path, [FILE])?;
     text.ok_or_else(|| StoredResultError::NoModel { path: path.to_owned(), why: why() })
@@ -134,7 +138,7 @@ fn chain_text(chain: &Chain, texts: &[String], pipeline_text: &str) -> ChainText
     ChainText::Arms { arms: arms.collect() }
 }
 
-fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFacts {
+fn recording_facts(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFacts {
     let own: Vec<&Observation> = run.observations.iter().filter(|o| o.dwell.recording == index).collect();
     let temperatures: Vec<f64> = own.iter().filter_map(|o| o.temperature_c).collect();
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
@@ -150,13 +154,13 @@ fn recording(recording: &RecordingRun, index: usize, run: &Run) -> RecordingFact
     }
 }
 
-fn thinned(observations: &[Observation]) -> Vec<Vec<f64>> {
+fn thin_postures(observations: &[Observation]) -> Vec<Vec<f64>> {
     let stride = observations.len().div_ceil(MOST_POSTURES).max(1);
     observations.iter().step_by(stride).map(|o| o.joint_rad.clone()).collect()
 }
 
 /// What each joint of the model visited in these observations.
-pub fn visited(model: &Model, observations: &[Observation]) -> Vec<Visited> {
+pub fn visited_intervals(model: &Model, observations: &[Observation]) -> Vec<Visited> {
     let of_joint = |joint: usize| {
         let readings = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied());
         Visited::of(readings, model.chain().joint_unit(joint) == Unit::Metre)
@@ -164,7 +168,7 @@ pub fn visited(model: &Model, observations: &[Observation]) -> Vec<Visited> {
     (0..model.joint_count()).map(of_joint).collect()
 }
 
-fn range(observations: &[Observation], joint: usize) -> [f64; 2] {
+fn joint_range(observations: &[Observation], joint: usize) -> [f64; 2] {
     let readings = observations.iter().filter_map(|o| o.joint_rad.get(joint).copied());
     let start = [f64::INFINITY, f64::NEG_INFINITY];
     readings.fold(start, |[low, high], q| [q.min(low), q.max(high)])

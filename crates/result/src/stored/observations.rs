@@ -105,7 +105,7 @@ pub fn observations_json(run: &Run) -> Result<String, ResultError> {
         board: run.board.as_ref().map(BoardFacts::of),
         settings,
         session: run.session.clone(),
-        recordings: run.recordings.iter().enumerate().map(|(i, r)| recording(run, i, r)).collect(),
+        recordings: run.recordings.iter().enumerate().map(|(i, r)| observed_recording(run, i, r)).collect(),
     };
     Ok(serde_json::to_string(&past).map_err(ResultError::Json)? + "\n")
 }
@@ -124,7 +124,8 @@ impl StoredObservations {
         }
         for (index, recording) in past.recordings.iter().enumerate() {
             for o in &recording.observations {
-                check(o, index).map_err(|why| bad(format!("{} of `{}`: {why}", o.dwell, recording.name)))?;
+                check_observation(o, index)
+                    .map_err(|why| bad(format!("{} of `{}`: {why}", o.dwell, recording.name)))?;
             }
         }
         Ok(past)
@@ -139,7 +140,7 @@ impl ObservedRecording {
 }
 
 /// Lists of an observation that should have one entry a joint.
-fn check(o: &Observation, recording: usize) -> Result<(), String> {
+fn check_observation(o: &Observation, recording: usize) -> Result<(), String> {
     let joints = o.joint_rad.len();
     let counts = [
         ("joint_sigma_rad", Some(o.joint_sigma_rad.len()), joints),
@@ -159,7 +160,7 @@ fn check(o: &Observation, recording: usize) -> Result<(), String> {
     Ok(())
 }
 
-fn recording(run: &Run, index: usize, recording: &RecordingRun) -> ObservedRecording {
+fn observed_recording(run: &Run, index: usize, recording: &RecordingRun) -> ObservedRecording {
     let start = run.model.nominal();
     // What the recording has for itself is its base.
     let (model, start) = run.model.in_recording(index, &start);

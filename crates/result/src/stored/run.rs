@@ -1,8 +1,8 @@
 //! A run read back from its `run.mcap`: what comparing and re-reading need, without the recordings it came from.
 
 use crate::left_out::{INPUT_METADATA, OWN};
-use crate::proto::parameter;
-use crate::run::{RecordingRun, Run, effects};
+use crate::proto::parameter_message;
+use crate::run::{RecordingRun, Run, effect_part_names};
 use crate::{DwellMark, proto};
 use armcal_calibrate::Residual;
 use armcal_core::{Dwell, DwellId, Observation};
@@ -140,11 +140,11 @@ pub fn attached_texts<const N: usize>(
     let path = run_file(results);
     let at = |source| StoredResultError::Open { path: path.clone(), source: Box::new(source) };
     let recording = Recording::open(std::slice::from_ref(&path)).map_err(at)?;
-    attached(&recording, names).map_err(at)
+    read_attached_texts(&recording, names).map_err(at)
 }
 
 /// The same of one that is open.
-fn attached<const N: usize>(
+fn read_attached_texts<const N: usize>(
     recording: &Recording,
     names: [&str; N],
 ) -> Result<[Option<String>; N], RecordingError> {
@@ -180,9 +180,9 @@ impl StoredRun {
             recordings: run.recordings.iter().map(recording).collect(),
             path: PathBuf::new(),
             pipeline: run.pipeline_name.clone(),
-            effects: effects(&run.calibration).into_iter().map(str::to_owned).collect(),
+            effects: effect_part_names(&run.calibration).into_iter().map(str::to_owned).collect(),
             residuals: run.observations.iter().zip(&run.calibration.residuals).map(residual).collect(),
-            parameters: run.calibration.fit.estimates.iter().map(parameter).collect(),
+            parameters: run.calibration.fit.estimates.iter().map(parameter_message).collect(),
             summary: serde_json::Value::Null,
         }
     }
@@ -213,10 +213,10 @@ impl StoredRun {
         if residuals.is_empty() {
             return Err(missing("/armcal/residuals"));
         }
-        let [summary] = attached(&recording, [SUMMARY]).map_err(at)?;
+        let [summary] = read_attached_texts(&recording, [SUMMARY]).map_err(at)?;
         let inputs = recording.metadata().map_err(at)?;
         Ok(StoredRun {
-            recordings: recordings(&inputs, &dwells),
+            recordings: stored_recordings(&inputs, &dwells),
             pipeline: report.pipeline,
             effects: report.effects,
             residuals: residuals.into_iter().map(StoredResidual::from).collect(),
@@ -228,7 +228,7 @@ impl StoredRun {
 }
 
 /// The recordings, put together from the names and hashes of the input and the dwells.
-fn recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<StoredRecording> {
+fn stored_recordings(metadata: &[RawMetadata], dwells: &[proto::Dwell]) -> Vec<StoredRecording> {
     let mut found: BTreeMap<usize, StoredRecording> = BTreeMap::new();
     let inputs = metadata.iter().filter(|(name, _)| name == INPUT_METADATA).flat_map(|(_, entries)| entries);
     for (key, value) in inputs {

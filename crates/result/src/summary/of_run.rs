@@ -4,7 +4,9 @@ use super::{
     CovarianceSummary, ErrorsSummary, FitSummary, FrameEntry, JointSummary, PaperSummary, ParameterSummary,
     PlaceSummary, RecordingSummary, RefitSummary, RejectedSummary, SideSummary,
 };
-use crate::{RecordingRun, Refit, ResultError, Run, effects, role_word, status_word, visited};
+use crate::{
+    RecordingRun, Refit, ResultError, Run, effect_part_names, role_word, status_word, visited_intervals,
+};
 use armcal_calibrate::{Calibration, Estimate, Fit, SideErrors};
 use armcal_core::{Dwell, ErrorStats, FeatureId, Pose, RollPitchYaw};
 use armcal_table::{Assignment, Place};
@@ -28,7 +30,12 @@ impl<'a> RecordingSummary<'a> {
             dwells: r.found(),
             associated: run.associated(r),
             rejected: r.rejections.iter().map(rejected).collect(),
-            places: r.dwells.iter().enumerate().map(|(i, d)| place(d, r.assignments().get(i))).collect(),
+            places: r
+                .dwells
+                .iter()
+                .enumerate()
+                .map(|(i, d)| place_summary(d, r.assignments().get(i)))
+                .collect(),
             clock_offset_ms: r.earlier.is_none().then(|| clock.map_or(0.0, |c| c.offset_s * 1e3)),
             clock_offset_sigma_ms: estimated.map(|c| c.offset_sigma_s * 1e3),
             clock_drift_ppm: clock.map(|c| c.drift * 1e6),
@@ -39,7 +46,7 @@ impl<'a> RecordingSummary<'a> {
     }
 }
 
-fn place<'a>(dwell: &Dwell, assignment: Option<&'a Assignment>) -> PlaceSummary<'a> {
+fn place_summary<'a>(dwell: &Dwell, assignment: Option<&'a Assignment>) -> PlaceSummary<'a> {
     let place = assignment.map(|a| &a.place);
     let (cavity, confidence) = match place {
         Some(Place::Seated { cavity, confidence }) => (Some(cavity.as_str()), Some(*confidence)),
@@ -68,7 +75,7 @@ impl FitSummary<'_> {
         };
         FitSummary {
             objective: &c.fit.objective,
-            effects: effects(c),
+            effects: effect_part_names(c),
             status: status_word(c.fit.status),
             iterations: c.fit.iterations,
             noise_floor_mm: c.noise_floor_m * 1e3,
@@ -136,7 +143,7 @@ impl JointSummary<'_> {
     /// Of every joint of a run.
     pub fn all(run: &Run) -> Vec<JointSummary<'_>> {
         let chain = run.model.chain();
-        let each = visited(&run.model, &run.observations).into_iter().enumerate();
+        let each = visited_intervals(&run.model, &run.observations).into_iter().enumerate();
         each.map(|(index, visited)| JointSummary {
             name: &chain.joint_names()[index],
             unit: chain.joint_unit(index),

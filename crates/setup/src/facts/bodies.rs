@@ -1,7 +1,7 @@
 //! Base, table and tip: do they move and turn as what they are said to be?
 
-use super::{mistake, possible};
-use crate::beyond::apart;
+use super::{mistake_finding, possible_finding};
+use crate::beyond::pose_distance;
 use armcal_core::{Dwell, SetupFinding};
 use armcal_dwell::MeanPose;
 use armcal_stages::still::still_tip;
@@ -35,12 +35,12 @@ pub fn no_quaternion(inputs: &Inputs) -> Vec<SetupFinding> {
             let seen = format!("the orientation of the {role} is exactly the identity in every recording");
             let subject = format!("the {role}");
             match measured(role) {
-                true => mistake(
+                true => mistake_finding(
                     "quaternion-missing",
                     subject,
                     format!("{seen}: its quaternion is not filled in; mend what publishes [streams.{role}]"),
                 ),
-                false => possible(
+                false => possible_finding(
                     "quaternion-missing",
                     subject,
                     format!(
@@ -54,7 +54,7 @@ pub fn no_quaternion(inputs: &Inputs) -> Vec<SetupFinding> {
 }
 
 /// Streams whose motion is not that of what they are said to be.
-pub fn moving(inputs: &Inputs) -> Vec<SetupFinding> {
+pub fn swapped_streams(inputs: &Inputs) -> Vec<SetupFinding> {
     let mut all = Vec::new();
     for seen in &inputs.seen {
         let tips: Vec<_> = seen.dwells.iter().filter_map(|d| d.tip.as_ref().map(|t| t.position_m)).collect();
@@ -66,11 +66,11 @@ pub fn moving(inputs: &Inputs) -> Vec<SetupFinding> {
         };
         let turned_rad = seen.dwells.iter().map(moved).fold(0.0, f64::max);
         if let Some(message) = still_tip(tip_m, turned_rad).filter(|_| tips.len() > 2) {
-            all.push(mistake("streams-swapped", format!("recording `{}`", seen.name), message));
+            all.push(mistake_finding("streams-swapped", format!("recording `{}`", seen.name), message));
         }
         for (role, travel_m) in &seen.travels_m {
             if *travel_m > MOVES_M {
-                all.push(mistake(
+                all.push(mistake_finding(
                     "streams-swapped",
                     format!("recording `{}`", seen.name),
                     format!(
@@ -87,12 +87,12 @@ pub fn moving(inputs: &Inputs) -> Vec<SetupFinding> {
 
 /// Base and table that are one body in every recording.
 pub fn same_body(inputs: &Inputs) -> Option<SetupFinding> {
-    let of = |s: &RecordingData| Some(apart(&s.base.as_ref()?.pose, &s.table.as_ref()?.pose));
+    let of = |s: &RecordingData| Some(pose_distance(&s.base.as_ref()?.pose, &s.table.as_ref()?.pose));
     let all: Option<Vec<(f64, f64)>> = inputs.seen.iter().map(of).collect();
     let all =
         all.filter(|all| !all.is_empty() && all.iter().all(|(m, rad)| *m < SAME_M && *rad < SAME_RAD))?;
     let apart_mm = all.iter().map(|(m, _)| m * 1e3).fold(0.0, f64::max);
-    Some(mistake(
+    Some(mistake_finding(
         "streams-equal",
         "base and table".to_owned(),
         format!(

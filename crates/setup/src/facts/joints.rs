@@ -1,8 +1,8 @@
 //! Readings of joints that no encoder gives: stuck, speeds, what was asked for.
 
-use super::{mistake, possible};
+use super::{mistake_finding, possible_finding};
 use armcal_core::{Dwell, SetupFinding};
-use armcal_stages::still::{TURNS_RAD, spread};
+use armcal_stages::still::{TURNS_RAD, value_range};
 use armcal_stages::{Inputs, RecordingData};
 
 /// Readings that end within this of each other end at one value [rad].
@@ -19,12 +19,12 @@ const EXACT_RAD: f64 = 1e-9;
 const FINEST: u32 = 12;
 
 /// Joints that read nearly zero most of the time: speeds do, angles do not.
-pub fn speeds(inputs: &Inputs) -> Option<SetupFinding> {
+pub fn speed_readings(inputs: &Inputs) -> Option<SetupFinding> {
     let all = !inputs.seen.is_empty() && inputs.seen.iter().all(|s| s.readings.mostly_zero);
     all.then(|| {
         let message = "every joint reads nearly zero most of the time, and not always: these are speeds, or another field than \
                        the angles; mend [streams.joints]";
-        mistake("wrong-field", "the joints".to_owned(), message.to_owned())
+        mistake_finding("wrong-field", "the joints".to_owned(), message.to_owned())
     })
 }
 
@@ -41,7 +41,7 @@ pub fn set_points(inputs: &Inputs) -> Option<SetupFinding> {
         read.dedup_by(|a, b| (*a - *b).abs() < EXACT_RAD);
         read.len() < 2 || steps_of(&read)
     });
-    let finding = possible(
+    let finding = possible_finding(
         "setpoints-recorded",
         "the joints".to_owned(),
         format!(
@@ -66,23 +66,23 @@ fn steps_of(sorted: &[f64]) -> bool {
 }
 
 /// Stamps of the joints that no clock gives.
-pub fn stamps(inputs: &Inputs) -> Vec<SetupFinding> {
+pub fn wrong_stamps(inputs: &Inputs) -> Vec<SetupFinding> {
     let of = |s: &RecordingData| {
         let why = s.readings.stamps.as_ref()?;
         let message = format!("{why}; mend what stamps them, or set `clock = \"log\"` in [streams.joints]");
-        Some(mistake("stamps-wrong", format!("recording `{}`", s.name), message))
+        Some(mistake_finding("stamps-wrong", format!("recording `{}`", s.name), message))
     };
     inputs.seen.iter().filter_map(of).collect()
 }
 
 /// Joints whose readings end at one value, again and again, while others turn.
-pub fn saturated(inputs: &Inputs) -> Vec<SetupFinding> {
+pub fn saturated_readings(inputs: &Inputs) -> Vec<SetupFinding> {
     let read_rad: Vec<&[f64]> = inputs.dwells().map(|d| &d.joint_rad[..]).collect();
     let mut all = Vec::new();
     for (j, name) in inputs.chain.joint_names().iter().enumerate() {
         for (end, sign) in [("lowest", -1.0), ("highest", 1.0)] {
             let Some((n, value_rad)) = at_one_end(&read_rad, j, sign) else { continue };
-            all.push(possible(
+            all.push(possible_finding(
                 "joint-saturated",
                 format!("joint {} ({name})", j + 1),
                 format!(
@@ -120,9 +120,10 @@ fn at_one_end(read_rad: &[&[f64]], joint: usize, sign: f64) -> Option<(usize, f6
 
 /// Joints whose readings did not change while others turned. What an encoder reads of a joint that is held jitters as those
 /// of other joints do; where none does, a joint that nobody moved reads as one that is stuck.
-pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
+pub fn stuck_readings(inputs: &Inputs) -> Vec<SetupFinding> {
     let names = inputs.chain.joint_names();
-    let others_move = (0..names.len()).any(|j| spread(inputs.dwells().map(|d| d.joint_rad[j])) > TURNS_RAD);
+    let others_move =
+        (0..names.len()).any(|j| value_range(inputs.dwells().map(|d| d.joint_rad[j])) > TURNS_RAD);
     let mut all = Vec::new();
     for (j, name) in names.iter().enumerate().filter(|_| others_move) {
         let still = inputs.seen.iter().map(|s| (s, longest_still(&s.dwells, j)));
@@ -139,7 +140,7 @@ pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
         );
         let subject = format!("joint {} ({name})", j + 1);
         all.push(match still.iter().any(|d| d.joint_spread_rad.iter().any(|s| *s > EXACT_RAD)) {
-            true => mistake(
+            true => mistake_finding(
                 "joint-stuck",
                 subject,
                 format!(
@@ -147,7 +148,7 @@ pub fn stuck(inputs: &Inputs) -> Vec<SetupFinding> {
                      the stream of the joints or the driver"
                 ),
             ),
-            false => possible(
+            false => possible_finding(
                 "joint-stuck",
                 subject,
                 format!(

@@ -22,44 +22,44 @@ const FLAT_M: f64 = 0.01;
 const SOUND: f64 = 1.5;
 
 /// Whether the errors say that nothing of importance is wrong.
-pub fn sound(fitted: &Fitted) -> bool {
+pub fn is_sound(fitted: &Fitted) -> bool {
     fitted.calibration.times_floor() <= SOUND
 }
 
 /// Streams that are not what they are said to be, whatever was fitted to them; and where the errors are not `sound`, joints
 /// that never move and orientations that were never filled in.
-pub fn evident(inputs: &Inputs, sound: bool) -> Vec<SetupFinding> {
+pub fn evident_mistakes(inputs: &Inputs, sound: bool) -> Vec<SetupFinding> {
     let mut all: Vec<SetupFinding> = bodies::same_body(inputs).into_iter().collect();
-    all.extend(joints::speeds(inputs));
-    all.extend(bodies::moving(inputs));
+    all.extend(joints::speed_readings(inputs));
+    all.extend(bodies::swapped_streams(inputs));
     if !sound {
-        all.extend(joints::stuck(inputs));
+        all.extend(joints::stuck_readings(inputs));
         all.extend(bodies::no_quaternion(inputs));
     }
     all
 }
 
 /// Readings of joints that look like none, beside errors: saturated, with stamps of no clock, set-points.
-pub fn doubtful(inputs: &Inputs) -> Vec<SetupFinding> {
+pub fn suspect_readings(inputs: &Inputs) -> Vec<SetupFinding> {
     let mut all = Vec::new();
-    if joints::stuck(inputs).is_empty() {
-        all.extend(joints::saturated(inputs));
+    if joints::stuck_readings(inputs).is_empty() {
+        all.extend(joints::saturated_readings(inputs));
     }
-    all.extend(joints::stamps(inputs));
+    all.extend(joints::wrong_stamps(inputs));
     all.extend(joints::set_points(inputs));
     all
 }
 
 /// Tilts and frames that contradict their declaration. Poses that are fitted to errors say nothing of them.
-pub fn declared(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
-    let mut all = tilts(inputs, fitted);
+pub fn contradicted_declarations(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
+    let mut all = contradicted_tilts(inputs, fitted);
     all.extend(declared_frames(fitted));
     all
 }
 
 /// Declared tilts against the board's poses: between two recordings the board turns as its tilts say. A board without a
 /// mechanism stands as it was put, and cavities on one line do not show how it turned about that.
-fn tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
+fn contradicted_tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
     let Some(board) = inputs.board.as_ref().filter(|b| b.mechanism.is_some()) else { return Vec::new() };
     let values = fitted.calibration.fit.values();
     let pose = |r: usize| -> Option<(Pose, Pose)> {
@@ -83,7 +83,7 @@ fn tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
         let apart_rad = declared.angle(&found);
         if apart_rad > TILT_RAD {
             let (a, b) = (&inputs.seen[0].name, &inputs.seen[r].name);
-            all.push(mistake(
+            all.push(mistake_finding(
                 "tilt-declared",
                 format!("recording `{b}`"),
                 format!(
@@ -123,7 +123,7 @@ fn declared_frames(fitted: &Fitted) -> Vec<SetupFinding> {
         let off = e.value - e.parameter.nominal;
         if off.abs() > SIGMAS * sigma && off.abs() > OFF && e.parameter.free {
             let unit = e.parameter.unit;
-            all.push(possible(
+            all.push(possible_finding(
                 "frame-declared",
                 e.parameter.name.clone(),
                 format!(
@@ -141,11 +141,11 @@ fn declared_frames(fitted: &Fitted) -> Vec<SetupFinding> {
 }
 
 /// What is worth a look; the result may stand.
-fn possible(code: &'static str, subject: String, message: String) -> SetupFinding {
-    SetupFinding { certainty: Certainty::Possible, ..mistake(code, subject, message) }
+fn possible_finding(code: &'static str, subject: String, message: String) -> SetupFinding {
+    SetupFinding { certainty: Certainty::Possible, ..mistake_finding(code, subject, message) }
 }
 
-fn mistake(code: &'static str, subject: String, message: String) -> SetupFinding {
+fn mistake_finding(code: &'static str, subject: String, message: String) -> SetupFinding {
     let certainty = Certainty::Mistake;
     SetupFinding {
         code: code.into(),

@@ -32,12 +32,12 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         let change = format!("the board {words}");
         all.push(Hypothesis::new(code, "the board", change, FILE, move |i| map_cavities(i, |p| matrix * p)));
     }
-    all.extend(UNITS.map(scaled));
-    all.extend(Hypothesis::of_each(&SCALES, 1.0, FAR_SCALE, scaled));
+    all.extend(UNITS.map(scaled_board));
+    all.extend(Hypothesis::of_each(&SCALES, 1.0, FAR_SCALE, scaled_board));
     if !takes_any_height(inputs) {
-        all.extend(Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, raised));
+        all.extend(Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, raised_seats));
     }
-    for group in groups(&inputs.board) {
+    for group in cavity_groups(&inputs.board) {
         let at = move |height_mm| raised_alone(&group, height_mm);
         all.extend(Hypothesis::of_each(&GROUP_HEIGHTS_MM, 0.0, FAR_GROUP_MM, at));
     }
@@ -53,7 +53,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             }
         }));
     }
-    all.extend(tilts(inputs));
+    all.extend(tilt_hypotheses(inputs));
     all
 }
 
@@ -66,9 +66,9 @@ pub fn from_the_other_side(inputs: &Inputs) -> Vec<Hypothesis> {
     let mirrored = outlines.filter(|(matrix, ..)| !is_flat || matrix.m33 > 0.0);
     let of_each = |(matrix, words, code): (Matrix3<f64>, &'static str, &'static str)| {
         let at = move |height_mm: f64| {
-            let change = format!("the board {words} and its seats {}", higher(height_mm));
+            let change = format!("the board {words} and its seats {}", describe_height(height_mm));
             Hypothesis::new(code, "the board", change, FILE, move |i| {
-                map_cavities(i, |p| matrix * p + up(height_mm));
+                map_cavities(i, |p| matrix * p + vertical_shift_m(height_mm));
             })
         };
         Hypothesis::of_each(&HEIGHTS_MM, 0.0, FAR_HEIGHT_MM, at)
@@ -82,7 +82,7 @@ fn takes_any_height(inputs: &Inputs) -> bool {
 }
 
 /// Names of cavities without their numbers, where there is more than one.
-fn groups(board: &Option<Board>) -> Vec<String> {
+fn cavity_groups(board: &Option<Board>) -> Vec<String> {
     let names = board.iter().flat_map(|b| &b.cavities).map(|c| group_of(&c.name).to_owned());
     let all: BTreeSet<String> = names.collect();
     if (2..=MOST_GROUPS).contains(&all.len()) { all.into_iter().collect() } else { Vec::new() }
@@ -92,33 +92,33 @@ fn group_of(name: &str) -> &str {
     name.trim_end_matches(|c: char| c.is_ascii_digit())
 }
 
-fn scaled(scale: f64) -> Hypothesis {
+fn scaled_board(scale: f64) -> Hypothesis {
     let change = format!("the board {scale:.4} times as large");
     Hypothesis::new("board-scale", "the board", change, FILE, move |i| map_cavities(i, |p| scale * p))
 }
 
-fn raised(height_mm: f64) -> Hypothesis {
-    let change = format!("seated points {} than drawn", higher(height_mm));
+fn raised_seats(height_mm: f64) -> Hypothesis {
+    let change = format!("seated points {} than drawn", describe_height(height_mm));
     Hypothesis::new("seat-height", "the board", change, FILE, move |i| {
-        map_cavities(i, |p| p + up(height_mm));
+        map_cavities(i, |p| p + vertical_shift_m(height_mm));
     })
 }
 
 fn raised_alone(group: &str, height_mm: f64) -> Hypothesis {
     let (subject, group) = (format!("cavities `{group}…`"), group.to_owned());
-    let change = format!("the seats of the {subject} {} than drawn", higher(height_mm));
+    let change = format!("the seats of the {subject} {} than drawn", describe_height(height_mm));
     Hypothesis::new("seat-height", subject, change, FILE, move |i| {
         let own = i.board.iter_mut().flat_map(|b| &mut b.cavities).filter(|c| group_of(&c.name) == group);
-        own.for_each(|c| c.in_board_m += up(height_mm));
+        own.for_each(|c| c.in_board_m += vertical_shift_m(height_mm));
     })
 }
 
-fn up(height_mm: f64) -> Vector3<f64> {
+fn vertical_shift_m(height_mm: f64) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, height_mm * 1e-3)
 }
 
 /// `2.50 mm higher`.
-fn higher(height_mm: f64) -> String {
+fn describe_height(height_mm: f64) -> String {
     let side = if height_mm > 0.0 { "higher" } else { "lower" };
     format!("{:.2} mm {side}", height_mm.abs())
 }
@@ -144,7 +144,7 @@ fn map_cavities(inputs: &mut Inputs, of: impl Fn(Vector3<f64>) -> Vector3<f64>) 
 }
 
 /// Tilts with another sign, exchanged, left out, or of another recording.
-fn tilts(inputs: &Inputs) -> Vec<Hypothesis> {
+fn tilt_hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let declared: Vec<Tilt> = inputs.pipeline.recordings.iter().map(|r| r.tilt).collect();
     let mut all: Vec<(Vec<Tilt>, String)> = Vec::new();
     let each = |of: fn(Tilt) -> Tilt| declared.iter().map(|t| of(*t)).collect::<Vec<Tilt>>();

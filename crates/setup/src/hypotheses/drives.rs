@@ -2,8 +2,8 @@
 //!
 //! Rarer than a sign or an order: tried where none of those explains the errors.
 
-use super::joints::{scale, shift};
-use super::model::{WIDER, widened};
+use super::joints::{scale_reading, shift_reading};
+use super::model::{WIDER, widen_bounds};
 use super::{Estimated, Freedom, Hypothesis};
 use armcal_core::{Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override};
@@ -40,7 +40,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             let (set, subject) = (set.clone(), subject.clone());
             let change = format!("the reading of {subject} divided by {ratio}");
             all.push(Hypothesis::new("joint-scale", subject, change, RATIO, move |i| {
-                i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, 1.0 / ratio)));
+                i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, 1.0 / ratio)));
             }));
         }
     }
@@ -53,7 +53,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             all.push(Hypothesis::new("joint-coupling", joint(j), change, COUPLED, move |i| {
                 i.each_dwell(|d| {
                     let before_rad = sign * d.joint_rad[j - 1];
-                    shift(d, j, before_rad);
+                    shift_reading(d, j, before_rad);
                 });
             }));
         }
@@ -61,8 +61,8 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for j in 0..names.len() {
         let change = format!("the gear ratio of {} estimated", joint(j));
         let spec = EffectSpec::new("gear_ratio").at(j);
-        let scale = ("scale", within(RATIO_BOUND));
-        all.push(effect("joint-scale", joint(j), change, RATIO, spec, scale, RATIO_OFF));
+        let scale = ("scale", bounded_amplitude(RATIO_BOUND));
+        all.push(effect_hypothesis("joint-scale", joint(j), change, RATIO, spec, scale, RATIO_OFF));
     }
     all
 }
@@ -78,7 +78,7 @@ pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
         .then(|| (fixed.clone(), "all that the model file holds fixed estimated".to_owned()));
     for (set, change) in each.chain(together) {
         let names: Vec<String> = set.iter().map(|p| p.name.clone()).collect();
-        let subject = armcal_core::listed(&names);
+        let subject = armcal_core::list_names(&names);
         let freedom = if set.len() == 1 { Freedom::Number } else { Freedom::Frame };
         let estimated = set.iter().map(|p| Estimated::of(p, FAR_FREED)).collect();
         let hypothesis = Hypothesis::new("parameter-fixed", subject, change, FIXED, move |i| {
@@ -102,7 +102,7 @@ pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
         let names: Vec<String> = estimated.iter().map(|own| own.parameter.clone()).collect();
         let change = format!("the priors and bounds of the model's parameters {WIDER} times as wide");
         let hypothesis = Hypothesis::new("parameter-bound", "the model", change, PRIORS, move |i| {
-            i.changes.extend(names.iter().map(|name| widened(name)));
+            i.changes.extend(names.iter().map(|name| widen_bounds(name)));
         });
         all.push(hypothesis.estimating(Freedom::Frame, estimated));
     }
@@ -110,12 +110,12 @@ pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
 }
 
 /// An amplitude as far as this either way.
-pub fn within(bound: f64) -> Override {
+pub fn bounded_amplitude(bound: f64) -> Override {
     Override { bound: Some(bound), prior: Some(bound), ..Override::default() }
 }
 
 /// An effect of the catalogue whose one amplitude may be far larger than its physics allows.
-pub fn effect(
+pub fn effect_hypothesis(
     code: &'static str,
     subject: String,
     change: String,

@@ -21,8 +21,8 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let turning: Vec<usize> = (0..n).filter(|&j| inputs.chain.joint_unit(j) == Unit::Radian).collect();
     let joint = |j: usize| format!("joint {} ({})", j + 1, names[j]);
     let mut all = Vec::new();
-    all.extend(sign_sets(n).into_iter().map(|set| reversed(names, set)));
-    for order in orders(n) {
+    all.extend(sign_sets(n).into_iter().map(|set| sign_reversal(names, set)));
+    for order in joint_orders(n) {
         let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
         let change = format!("the joints read in the order {}", words.join(", "));
         all.push(Hypothesis::new("joint-order", "order of the joints", change, ORDER, move |i| {
@@ -37,7 +37,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         for (set, subject) in each.chain([(turning.clone(), "all joints".to_owned())]) {
             let change = format!("{subject} {words}");
             all.push(Hypothesis::new("joint-unit", subject, change, UNIT, move |i| {
-                i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, factor)));
+                i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, factor)));
             }));
         }
     }
@@ -46,7 +46,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         for (set, subject) in each.chain([((0..n).collect(), "all joints".to_owned())]) {
             let change = format!("{factor} times the reading of {subject}");
             all.push(Hypothesis::new("joint-scale", subject, change, COUNTS, move |i| {
-                i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, factor)));
+                i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, factor)));
             }));
         }
     }
@@ -54,7 +54,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         for quarters in [1.0, 2.0, 3.0] {
             let change = format!("the zero of {} moved by {} deg", joint(j), 90.0 * quarters);
             all.push(Hypothesis::new("joint-zero", joint(j), change, ZERO, move |i| {
-                i.each_dwell(|d| shift(d, j, quarters * FRAC_PI_2));
+                i.each_dwell(|d| shift_reading(d, j, quarters * FRAC_PI_2));
             }));
         }
     }
@@ -62,12 +62,12 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
 }
 
 /// The signs of these joints reversed.
-pub fn reversed(names: &[String], set: Vec<usize>) -> Hypothesis {
+pub fn sign_reversal(names: &[String], set: Vec<usize>) -> Hypothesis {
     let joint = |j: &usize| format!("joint {} ({})", j + 1, names[*j]);
     let subject = set.iter().map(joint).collect::<Vec<_>>().join(", ");
     let change = format!("the sign of {subject} reversed");
     Hypothesis::new("joint-sign", subject, change, SIGN, move |i| {
-        i.each_dwell(|d| set.iter().for_each(|&j| scale(d, j, -1.0)));
+        i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, -1.0)));
     })
 }
 
@@ -83,7 +83,7 @@ fn sign_sets(n: usize) -> Vec<Vec<usize>> {
 
 /// Orders other than the given one: all of few joints; of many the exchanges of two, the reverse, and the alphabetical
 /// slip by one place either way.
-fn orders(n: usize) -> Vec<Vec<usize>> {
+fn joint_orders(n: usize) -> Vec<Vec<usize>> {
     let same: Vec<usize> = (0..n).collect();
     let rotated = |by: usize| -> Vec<usize> { (0..n).map(|j| (j + by) % n).collect() };
     let mut all: Vec<Vec<usize>> = Vec::new();
@@ -108,7 +108,7 @@ fn orders(n: usize) -> Vec<Vec<usize>> {
     once
 }
 
-pub fn scale(d: &mut Dwell, j: usize, factor: f64) {
+pub fn scale_reading(d: &mut Dwell, j: usize, factor: f64) {
     d.joint_rad[j] *= factor;
     d.joint_sigma_rad[j] *= factor.abs();
     d.joint_spread_rad[j] *= factor.abs();
@@ -123,7 +123,7 @@ pub fn scale(d: &mut Dwell, j: usize, factor: f64) {
     }
 }
 
-pub fn shift(d: &mut Dwell, j: usize, by_rad: f64) {
+pub fn shift_reading(d: &mut Dwell, j: usize, by_rad: f64) {
     d.joint_rad[j] += by_rad;
     d.path_memory_rad[j].iter_mut().for_each(|q| *q += by_rad);
 }
@@ -147,9 +147,9 @@ mod tests {
 
     #[test]
     fn of_three_joints_every_order_is_tried_and_every_set_of_signs() {
-        assert_eq!(orders(3).len(), 5);
+        assert_eq!(joint_orders(3).len(), 5);
         assert_eq!(sign_sets(3).len(), 7);
-        assert_eq!(orders(6).len(), 15 + 3);
-        assert!(orders(1).is_empty());
+        assert_eq!(joint_orders(6).len(), 15 + 3);
+        assert!(joint_orders(1).is_empty());
     }
 }

@@ -12,7 +12,7 @@ mod zeros;
 
 use armcal_core::Parameter;
 use armcal_stages::Inputs;
-pub use joints::reversed;
+pub use joints::sign_reversal;
 use std::sync::Arc;
 
 /// A mistake that somebody may have made.
@@ -152,7 +152,7 @@ impl Hypothesis {
 
 /// Everything worth trying on these inputs, what is rarer apart: to be tried where nothing of the first explains the errors.
 /// `at_bound` are parameters that the fit left on their bounds.
-pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 2] {
+pub fn hypotheses_by_rarity(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 2] {
     let mut all = joints::hypotheses(inputs);
     all.extend(poses::hypotheses(inputs));
     all.extend(readings::hypotheses(inputs));

@@ -29,16 +29,22 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
         let name = p.name.clone();
         if p.nominal.abs() > SMALLEST {
             let change = format!("the sign of {name} reversed");
-            all.push(nominal("model-sign", &name, change, -1.0, 0.0));
+            all.push(nominal_change("model-sign", &name, change, -1.0, 0.0));
         }
         if p.unit == Unit::Radian && (name.ends_with(".theta") || name.ends_with(".alpha")) {
             for quarters in [-1.0, 1.0, 2.0] {
                 let change = format!("{} deg added to {name}", 90.0 * quarters);
-                all.push(nominal("model-angle", &name, change, 1.0, quarters * std::f64::consts::FRAC_PI_2));
+                all.push(nominal_change(
+                    "model-angle",
+                    &name,
+                    change,
+                    1.0,
+                    quarters * std::f64::consts::FRAC_PI_2,
+                ));
             }
         }
     }
-    let files = files(inputs);
+    let files = model_files(inputs);
     for (unit, factor, what, words) in [
         (Unit::Metre, 1e-3, "lengths", "a thousandth (micrometres given as millimetres)"),
         (Unit::Metre, 1e3, "lengths", "a thousand times as long (metres given as millimetres)"),
@@ -100,14 +106,14 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
         };
         let change = format!("{subject} free to leave its bounds");
         let hypothesis =
-            Hypothesis::new(code, subject, change, remedy, move |i| i.changes.push(widened(&own)));
+            Hypothesis::new(code, subject, change, remedy, move |i| i.changes.push(widen_bounds(&own)));
         all.push(hypothesis.estimating(Freedom::Number, vec![Estimated::beyond(p)]));
     }
     if at_bound.len() > 1 {
         let own: Vec<String> = at_bound.iter().map(|p| p.name.clone()).collect();
-        let change = format!("{} free to leave their bounds", armcal_core::listed(&own));
+        let change = format!("{} free to leave their bounds", armcal_core::list_names(&own));
         let hypothesis = Hypothesis::new("parameter-bound", "the model", change, FILE, move |i| {
-            i.changes.extend(own.iter().map(|name| widened(name)));
+            i.changes.extend(own.iter().map(|name| widen_bounds(name)));
         });
         let estimated = at_bound.iter().map(Estimated::beyond).collect();
         all.push(hypothesis.estimating(Freedom::Frame, estimated));
@@ -117,7 +123,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
 
 /// The parameters of each model file. Of tips joined to each other, or brought into points, and seen by no sensor no change of all
 /// lengths at once is tried: a robot that is smaller, or seen in a mirror, closes just as well.
-fn files(inputs: &Inputs) -> Vec<(String, &[Parameter])> {
+fn model_files(inputs: &Inputs) -> Vec<(String, &[Parameter])> {
     let Inputs { pipeline, chain, .. } = inputs;
     let Streams { tip, bodies, .. } = &pipeline.streams;
     let measured = pipeline.measures();
@@ -139,7 +145,7 @@ fn files(inputs: &Inputs) -> Vec<(String, &[Parameter])> {
 /// A model of another size, or of an arm with another tool. Rarer.
 pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
     let mut all = Vec::new();
-    for (model, parameters) in files(inputs) {
+    for (model, parameters) in model_files(inputs) {
         let lengths: Vec<String> =
             parameters.iter().filter(|p| p.unit == Unit::Metre).map(|p| p.name.clone()).collect();
         if lengths.is_empty() {
@@ -158,7 +164,7 @@ pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
             let name = last.name.clone();
             all.extend(Hypothesis::of_each(&LONGER_MM, 0.0, FAR_LONGER_MM, move |mm| {
                 let change = format!("{mm:+.1} mm added to {name} (a tool that is longer, or was left out)");
-                nominal("tool-length", &name, change, 1.0, mm * 1e-3)
+                nominal_change("tool-length", &name, change, 1.0, mm * 1e-3)
             }));
         }
     }
@@ -177,11 +183,11 @@ fn columns_exchanged(parameters: &[Parameter]) -> Vec<Change> {
 }
 
 /// A parameter let go far beyond its bounds.
-pub fn widened(name: &str) -> Change {
+pub fn widen_bounds(name: &str) -> Change {
     Change::widened(name, WIDER)
 }
 
-fn nominal(code: &'static str, name: &str, change: String, times: f64, plus: f64) -> Hypothesis {
+fn nominal_change(code: &'static str, name: &str, change: String, times: f64, plus: f64) -> Hypothesis {
     let own = name.to_owned();
     Hypothesis::new(code, name, change, FILE, move |i| i.changes.push(Change::nominal(&own, times, plus)))
 }

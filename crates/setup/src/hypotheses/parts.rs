@@ -2,7 +2,7 @@
 
 use super::Hypothesis;
 use armcal_stages::Inputs;
-use armcal_stages::still::{TURNS_RAD, spread};
+use armcal_stages::still::{TURNS_RAD, value_range};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ const APART: &str = "mend it in the driver that recorded this, or give what diff
                      together)";
 
 /// Recordings in which something may be otherwise than in the rest: from each on, and each alone; with the words for them.
-pub fn parts(inputs: &Inputs) -> Vec<(Range<usize>, String)> {
+pub fn recording_ranges(inputs: &Inputs) -> Vec<(Range<usize>, String)> {
     let n = inputs.seen.len();
     let name = |r: usize| &inputs.seen[r].name;
     // From the first on is always, from the last on is the last alone.
@@ -23,7 +23,7 @@ pub fn parts(inputs: &Inputs) -> Vec<(Range<usize>, String)> {
 
 /// Those of the changes `of_all` recordings that may be right of a part of them.
 pub fn hypotheses(inputs: &Inputs, of_all: &[Hypothesis]) -> Vec<Hypothesis> {
-    let parts = parts(inputs);
+    let parts = recording_ranges(inputs);
     let mut all = Vec::new();
     for h in of_all.iter().filter(|h| !parts.is_empty() && PARTLY.contains(&h.code)) {
         let changed = h.undone(inputs);
@@ -31,13 +31,18 @@ pub fn hypotheses(inputs: &Inputs, of_all: &[Hypothesis]) -> Vec<Hypothesis> {
         let tells = |part: &Range<usize>| {
             !of_readings || more_than_a_zero(&read_rad(inputs, part), &read_rad(&changed, part))
         };
-        all.extend(parts.iter().filter(|(part, _)| tells(part)).map(|(part, words)| within(h, part, words)));
+        all.extend(
+            parts
+                .iter()
+                .filter(|(part, _)| tells(part))
+                .map(|(part, words)| restrict_to_part(h, part, words)),
+        );
     }
     all
 }
 
 /// The change made to these recordings alone.
-fn within(h: &Hypothesis, part: &Range<usize>, words: &str) -> Hypothesis {
+fn restrict_to_part(h: &Hypothesis, part: &Range<usize>, words: &str) -> Hypothesis {
     let (apply, part) = (h.apply.clone(), part.clone());
     Hypothesis {
         subject: format!("{}, {words}", h.subject),
@@ -60,7 +65,7 @@ fn read_rad<'i>(inputs: &'i Inputs, part: &Range<usize>) -> Vec<&'i [f64]> {
 /// have slipped.
 fn more_than_a_zero(before_rad: &[&[f64]], after_rad: &[&[f64]]) -> bool {
     let joints = before_rad.first().map_or(0, |q| q.len());
-    let by_rad = |j: usize| spread(before_rad.iter().zip(after_rad).map(|(b, a)| a[j] - b[j]));
+    let by_rad = |j: usize| value_range(before_rad.iter().zip(after_rad).map(|(b, a)| a[j] - b[j]));
     (0..joints).any(|j| by_rad(j) > TURNS_RAD)
 }
 

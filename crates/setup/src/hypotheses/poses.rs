@@ -25,7 +25,8 @@ enum Body {
 
 pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let tip_seen = inputs.dwells().any(|d| d.tip.is_some());
-    let oriented = inputs.pipeline.fit.use_orientation && inputs.dwells().any(|d| orientation(d).is_some());
+    let oriented =
+        inputs.pipeline.fit.use_orientation && inputs.dwells().any(|d| tip_orientation(d).is_some());
     let base = inputs.seen.iter().any(|s| s.base.is_some());
     let table = inputs.seen.iter().any(|s| s.table.is_some());
     let mut all = Vec::new();
@@ -38,8 +39,8 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
                 map_positions(i, Matrix3::identity() * factor, false);
             }));
         }
-        all.extend(Hypothesis::of_each(&SCALES, 1.0, FAR_SCALE, scaled));
-        for (matrix, words, code) in axes() {
+        all.extend(Hypothesis::of_each(&SCALES, 1.0, FAR_SCALE, scaled_positions));
+        for (matrix, words, code) in axis_maps() {
             let change = format!("the sensor's {words}");
             all.push(Hypothesis::new(code, "the sensor's axes", change, STREAMS, move |i| {
                 map_positions(i, matrix, false);
@@ -59,7 +60,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             }));
         }
     }
-    for (turned, words, code) in quaternions() {
+    for (turned, words, code) in quaternion_maps() {
         for (body, present, name) in [(Body::Base, base, "the base"), (Body::Table, table, "the table")] {
             if present {
                 let change = format!("the quaternion of {name} {words}");
@@ -102,7 +103,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             }));
         }
     }
-    if inputs.dwells().any(|d| orientation(d).is_some()) {
+    if inputs.dwells().any(|d| tip_orientation(d).is_some()) {
         let change = "the pose of the tip inverted";
         all.push(Hypothesis::new("pose-inverted", "the tip", change, STREAMS, invert_tips));
         if base || table {
@@ -127,19 +128,19 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     all
 }
 
-fn scaled(scale: f64) -> Hypothesis {
+fn scaled_positions(scale: f64) -> Hypothesis {
     let change = format!("the sensor's lengths {scale:.4} times as large");
     Hypothesis::new("position-scale", "positions", change, CAMERAS, move |i| {
         map_positions(i, Matrix3::identity() * scale, false);
     })
 }
 
-fn orientation(d: &armcal_core::Dwell) -> Option<UnitQuaternion<f64>> {
+fn tip_orientation(d: &armcal_core::Dwell) -> Option<UnitQuaternion<f64>> {
     d.tip.as_ref().and_then(|t| t.orientation)
 }
 
 /// Axes mirrored, exchanged, or named a place off, positions only.
-fn axes() -> Vec<(Matrix3<f64>, &'static str, &'static str)> {
+fn axis_maps() -> Vec<(Matrix3<f64>, &'static str, &'static str)> {
     let rows = |a: [f64; 9]| Matrix3::from_row_slice(&a);
     vec![
         (rows([-1., 0., 0., 0., 1., 0., 0., 0., 1.]), "x axis reversed", "axis-mirrored"),
@@ -156,16 +157,24 @@ fn axes() -> Vec<(Matrix3<f64>, &'static str, &'static str)> {
 type Turned = fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>;
 
 /// Components in another order, or the inverse. A mean of quaternions taken in one order is the mean of the others.
-fn quaternions() -> [(Turned, &'static str, &'static str); 3] {
+fn quaternion_maps() -> [(Turned, &'static str, &'static str); 3] {
     [
-        (|q| renamed([q.k, q.w, q.i, q.j]), "taken as x, y, z, w instead of w, x, y, z", "quaternion-order"),
-        (|q| renamed([q.i, q.j, q.k, q.w]), "taken as w, x, y, z instead of x, y, z, w", "quaternion-order"),
+        (
+            |q| quaternion_from_wxyz([q.k, q.w, q.i, q.j]),
+            "taken as x, y, z, w instead of w, x, y, z",
+            "quaternion-order",
+        ),
+        (
+            |q| quaternion_from_wxyz([q.i, q.j, q.k, q.w]),
+            "taken as w, x, y, z instead of x, y, z, w",
+            "quaternion-order",
+        ),
         (|q| q.conjugate(), "conjugated", "quaternion-conjugate"),
     ]
 }
 
 /// From w, x, y, z.
-fn renamed([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+fn quaternion_from_wxyz([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
 
@@ -193,7 +202,7 @@ fn invert_tips(inputs: &mut Inputs) {
 }
 
 /// A reflection M maps a rotation R to M R M'.
-fn turned(matrix: &Matrix3<f64>, q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+fn map_rotation(matrix: &Matrix3<f64>, q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_matrix(&(matrix * q.to_rotation_matrix().matrix() * matrix.transpose()))
 }
 
@@ -204,7 +213,7 @@ fn map_tips(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) {
             tip.position_m = matrix * tip.position_m;
             tip.covariance_m2 = matrix * tip.covariance_m2 * matrix.transpose();
             if orientations {
-                tip.orientation = tip.orientation.map(|q| turned(&matrix, q));
+                tip.orientation = tip.orientation.map(|q| map_rotation(&matrix, q));
             }
         }
     });
@@ -217,7 +226,7 @@ fn map_positions(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) 
         map_bodies(inputs, body, |p| {
             p.pose.translation.vector = matrix * p.pose.translation.vector;
             if orientations {
-                p.pose.rotation = turned(&matrix, p.pose.rotation);
+                p.pose.rotation = map_rotation(&matrix, p.pose.rotation);
             }
         });
     }
@@ -231,11 +240,11 @@ mod tests {
     fn each_order_of_a_quaternion_undoes_the_other() {
         let right = UnitQuaternion::from_euler_angles(0.3, -1.1, 2.0);
         // Written w, x, y, z into fields that are read as x, y, z, w.
-        let wrong = renamed([right.k, right.w, right.i, right.j]);
-        let [_, (second, ..), _] = quaternions();
+        let wrong = quaternion_from_wxyz([right.k, right.w, right.i, right.j]);
+        let [_, (second, ..), _] = quaternion_maps();
         assert!(second(wrong).angle_to(&right) < 1e-12);
-        let wrong = renamed([right.i, right.j, right.k, right.w]);
-        let [(first, ..), ..] = quaternions();
+        let wrong = quaternion_from_wxyz([right.i, right.j, right.k, right.w]);
+        let [(first, ..), ..] = quaternion_maps();
         assert!(first(wrong).angle_to(&right) < 1e-12);
     }
 }

@@ -2,10 +2,10 @@
 //!
 //! Rarer than a sign or an order, and more of them: tried where none of those explains the errors.
 
-use super::drives::{effect, within};
-use super::joints::{SIGN, ZERO, scale, shift};
-use super::model::widened;
-use super::parts::parts;
+use super::drives::{bounded_amplitude, effect_hypothesis};
+use super::joints::{SIGN, ZERO, scale_reading, shift_reading};
+use super::model::widen_bounds;
+use super::parts::recording_ranges;
 use super::{Estimated, Freedom, Hypothesis};
 use armcal_core::{DwellId, Parameter, Unit};
 use armcal_model::{EffectSpec, Override, Since};
@@ -42,21 +42,21 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
 }
 
 /// `joint 2 (elbow)`.
-fn named(inputs: &Inputs, j: usize) -> String {
+fn joint_label(inputs: &Inputs, j: usize) -> String {
     format!("joint {} ({})", j + 1, inputs.chain.joint_names()[j])
 }
 
 /// One joint with another sign and a quarter or half turn, two joints with that much of a zero.
 fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
-    let joint = |j: usize| named(inputs, j);
+    let joint = |j: usize| joint_label(inputs, j);
     let mut all = Vec::new();
     for &j in turning {
         for (quarters, words) in [(1.0, "+90"), (-1.0, "-90"), (2.0, "180")] {
             let change = format!("the sign of {} reversed and {words} deg added to it", joint(j));
             all.push(Hypothesis::new("joint-sign", joint(j), change, SIGN, move |i| {
                 i.each_dwell(|d| {
-                    scale(d, j, -1.0);
-                    shift(d, j, quarters * FRAC_PI_2);
+                    scale_reading(d, j, -1.0);
+                    shift_reading(d, j, quarters * FRAC_PI_2);
                 });
             }));
         }
@@ -66,7 +66,9 @@ fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
             let (subject, degrees) = (format!("{} and {}", joint(j), joint(k)), (90.0 * a, 90.0 * b));
             let change = format!("the zeros of {subject} moved by {} and {} deg", degrees.0, degrees.1);
             all.push(Hypothesis::new("joint-zero", subject, change, ZERO, move |i| {
-                i.each_dwell(|d| [(j, a), (k, b)].iter().for_each(|(j, by)| shift(d, *j, by * FRAC_PI_2)));
+                i.each_dwell(|d| {
+                    [(j, a), (k, b)].iter().for_each(|(j, by)| shift_reading(d, *j, by * FRAC_PI_2))
+                });
             }));
         }
     }
@@ -76,14 +78,14 @@ fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
 /// A joint with another zero, or with another zero and sign.
 fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
     let theta = format!("{}.theta", inputs.chain.joint_names()[j]);
-    let subject = named(inputs, j);
+    let subject = joint_label(inputs, j);
     let mut all = Vec::new();
     match inputs.chain.parameters().iter().find(|p| p.name == theta) {
         Some(p) => all.extend(ZEROS_DEG.iter().map(|start_deg| {
             let change = format!("another zero of {subject} ({theta})");
             let (name, plus) = (theta.clone(), start_deg.to_radians());
             let hypothesis = Hypothesis::new("joint-zero", subject.clone(), change, ZERO, move |i| {
-                i.changes.push(Change { plus, ..widened(&name) });
+                i.changes.push(Change { plus, ..widen_bounds(&name) });
             });
             hypothesis.estimating(Freedom::Number, vec![Estimated::of(p, FAR_ZERO_RAD)])
         })),
@@ -93,7 +95,7 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
             all.extend(Hypothesis::of_each(&SHIFTS_DEG, 0.0, FAR_ZERO_RAD.to_degrees(), move |deg| {
                 let change = format!("the zero of {subject} moved by {deg:.2} deg");
                 Hypothesis::new("joint-zero", subject.clone(), change, ZERO, move |i| {
-                    i.each_dwell(|d| shift(d, j, deg.to_radians()));
+                    i.each_dwell(|d| shift_reading(d, j, deg.to_radians()));
                 })
             }));
         }
@@ -103,8 +105,8 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
         let change = format!("the sign of {subject} reversed and {deg:.2} deg added to it");
         Hypothesis::new("joint-sign", subject.clone(), change, SIGN, move |i| {
             i.each_dwell(|d| {
-                scale(d, j, -1.0);
-                shift(d, j, deg.to_radians());
+                scale_reading(d, j, -1.0);
+                shift_reading(d, j, deg.to_radians());
             });
         })
     }));
@@ -113,28 +115,29 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
 
 /// A joint that was homed again.
 fn between_recordings(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
-    let joint = |j: usize| named(inputs, j);
+    let joint = |j: usize| joint_label(inputs, j);
     let mut all = Vec::new();
-    let moments = moments(inputs);
+    let moments = homing_times(inputs);
     for (&j, (since, words)) in turning.iter().flat_map(|j| moments.iter().map(move |moment| (j, moment))) {
         for start_deg in SLIPS_DEG {
             let change = format!("another zero of {} {words}", joint(j));
             let spec = EffectSpec::new("zero_slip").at(j).since(*since);
             let unit = Some("deg".to_owned());
-            let offset = ("offset", Override { unit, start: Some(start_deg), ..within(ZERO_BOUND_DEG) });
-            all.push(effect("joint-zero", joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
+            let offset =
+                ("offset", Override { unit, start: Some(start_deg), ..bounded_amplitude(ZERO_BOUND_DEG) });
+            all.push(effect_hypothesis("joint-zero", joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
         }
     }
     all
 }
 
 /// When a joint may have been homed again: from each recording on, and for each alone.
-fn moments(inputs: &Inputs) -> Vec<(Since, String)> {
+fn homing_times(inputs: &Inputs) -> Vec<(Since, String)> {
     let since = |part: Range<usize>| match part.end == inputs.seen.len() {
         true => Since::Dwell(DwellId { recording: part.start, dwell: 0 }),
         false => Since::Recording(part.start),
     };
-    parts(inputs).into_iter().map(|(part, words)| (since(part), words)).collect()
+    recording_ranges(inputs).into_iter().map(|(part, words)| (since(part), words)).collect()
 }
 
 /// The zeros of all joints, where more than one of them is on its bound.
@@ -144,7 +147,7 @@ fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
     let far = at_bound.iter().filter(|p| is_zero(p)).map(Estimated::beyond).collect::<Vec<_>>();
     (far.len() > 1).then(|| {
         let change = "the zeros of all joints free to leave their bounds";
-        let widen = move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|p| widened(&p.name)));
+        let widen = move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|p| widen_bounds(&p.name)));
         Hypothesis::new("joint-zero", "all joints", change, ZERO, widen).estimating(Freedom::Number, far)
     })
 }

@@ -13,7 +13,7 @@ const NEAR: f64 = 0.85;
 ///
 /// All rows are written in one way: seconds, date and time with or without a zone, or the time of a day, which goes on over
 /// midnight: the next row is within half a day of the one before.
-pub fn read(column: &[(u64, &str)]) -> Result<Vec<i64>, String> {
+pub fn parse_times(column: &[(u64, &str)]) -> Result<Vec<i64>, String> {
     let dates = DATES
         .iter()
         .flat_map(|d| [' ', 'T'].into_iter().flat_map(move |s| TIMES.map(|t| format!("{d}{s}{t}"))));
@@ -101,7 +101,7 @@ impl Offset {
 /// The offsets at which the most dwells have a row, best first; of those that differ by less than half of the dwells last, one.
 ///
 /// A row is in a dwell for an interval of offsets: all ends of all intervals are passed in turn.
-pub fn offsets(rows_ns: &[i64], dwells_ns: &[(i64, i64)]) -> Vec<Offset> {
+pub fn offset_candidates(rows_ns: &[i64], dwells_ns: &[(i64, i64)]) -> Vec<Offset> {
     // Where an interval ends another may begin at the same offset: both hold there.
     let mut ends: Vec<(i64, bool, usize)> = Vec::with_capacity(2 * rows_ns.len() * dwells_ns.len());
     for row in rows_ns {
@@ -155,7 +155,7 @@ mod tests {
 
     fn seconds(column: &[&str]) -> Result<Vec<f64>, String> {
         let column: Vec<(u64, &str)> = (2..).zip(column.iter().copied()).collect();
-        Ok(read(&column)?.into_iter().map(|ns| ns as f64 / 1e9).collect())
+        Ok(parse_times(&column)?.into_iter().map(|ns| ns as f64 / 1e9).collect())
     }
 
     #[test]
@@ -216,7 +216,7 @@ mod tests {
             .map(|(_, d)| (d.0 + d.1) / 2 - truth)
             .collect();
         rows.insert(9, dwells[20].1 + 1_000 - truth);
-        let found = offsets(&rows, &dwells);
+        let found = offset_candidates(&rows, &dwells);
         let best = &found[0];
         assert!((best.ns - truth).abs() <= best.within_ns && best.dwells == 27, "{found:?}");
         let paired: Vec<Option<usize>> = rows.iter().map(|r| best.dwell(*r, &dwells)).collect();
@@ -226,9 +226,9 @@ mod tests {
         // Like clockwork: shifts by whole periods are told apart by nothing here.
         let even: Vec<(i64, i64)> = (0..40).map(|k| (k * 5_000, k * 5_000 + 2_000)).collect();
         let rows: Vec<i64> = even[4..34].iter().map(|d| d.0 + 700).collect();
-        let found = offsets(&rows, &even);
+        let found = offset_candidates(&rows, &even);
         assert!(found.len() > 10 && found[..11].iter().all(|o| o.dwells == 30), "{found:?}");
         assert!(found.iter().any(|o| o.ns.abs() <= o.within_ns));
-        assert!(offsets(&[], &even).is_empty() && offsets(&rows, &[]).is_empty());
+        assert!(offset_candidates(&[], &even).is_empty() && offset_candidates(&rows, &[]).is_empty());
     }
 }

@@ -8,10 +8,10 @@ mod clock;
 pub mod rows;
 
 use crate::RunError;
-use crate::links::place;
+use crate::links::place_on_link;
 use armcal_config::{PointsFile, read_text};
 use armcal_core::robust::median;
-use armcal_core::{Dwell, Pose, Severity, Stage, TipMeasurement, Warning, listed};
+use armcal_core::{Dwell, Pose, Severity, Stage, TipMeasurement, Warning, list_names};
 use armcal_model::Model;
 use armcal_recording::input::Kind;
 use clock::Offset;
@@ -30,7 +30,7 @@ const SAME: f64 = 6.0;
 const STREAM: usize = 10;
 
 /// Gives each dwell of a recording the point of its row.
-pub fn add(
+pub fn assign_to_dwells(
     points: &PointsFile,
     (path, recording): (&Path, &str),
     model: &Model,
@@ -50,7 +50,7 @@ pub fn add(
     .map_err(bad)?;
     let off_m = fit.off_m(&dwell_of);
     let is_doubtful = off_m.is_finite() && off_m > DOUBTFUL * fit.spread_m();
-    measured(dwells, &table, &dwell_of, points.sigma_mm * 1e-3).map_err(bad)?;
+    write_measurements(dwells, &table, &dwell_of, points.sigma_mm * 1e-3).map_err(bad)?;
     let without = dwells.iter().filter(|d| d.tip.is_none()).count();
     let severity = if is_doubtful { Severity::Inadequate } else { Severity::Notice };
     let doubt = match (is_doubtful, &table.began) {
@@ -68,7 +68,7 @@ pub fn add(
 }
 
 /// Writes the points into their dwells, the mean where there are several; such errors go together, so it is no better than one.
-fn measured(
+fn write_measurements(
     dwells: &mut [Dwell],
     table: &Table,
     dwell_of: &[Option<usize>],
@@ -124,7 +124,7 @@ impl Fit<'_> {
         let seen = dwell_of.iter().zip(self.rows);
         let seen = seen.filter_map(|(dwell, row)| Some((self.poses[(*dwell)?], row.point_m?)));
         let (poses, seen_m): (Vec<_>, Vec<_>) = seen.unzip();
-        place(&poses, &seen_m).map_or(f64::INFINITY, |placed| placed.off_m)
+        place_on_link(&poses, &seen_m).map_or(f64::INFINITY, |placed| placed.off_m)
     }
 
     /// How far half of the points are from their middle [m].
@@ -152,7 +152,8 @@ impl Fit<'_> {
                 ));
             }
             None => {
-                let found = clearest((0..=m - n).map(|first| (self.off_m(&from(first)), first)).collect());
+                let found =
+                    clearest_fit((0..=m - n).map(|first| (self.off_m(&from(first)), first)).collect());
                 found.map_err(|rivals| match rivals {
                     None => format!(
                         "so few points do not tell which {n} of the {m} dwells they were measured in: set first_dwell"
@@ -184,7 +185,7 @@ impl Fit<'_> {
             ));
         }
         let earliest_ns = times_ns.iter().copied().min().unwrap_or(0);
-        let mut offsets = clock::offsets(&times_ns, &lasted_ns);
+        let mut offsets = clock::offset_candidates(&times_ns, &lasted_ns);
         offsets.retain(|o| first.is_none_or(|first| o.dwell(earliest_ns, &lasted_ns) == Some(first)));
         let pair = |offset: &Offset| -> Vec<Option<usize>> {
             let dwell = |row: &Row| row.point_m.and_then(|_| offset.dwell(row.time_ns, &lasted_ns));
@@ -196,7 +197,7 @@ impl Fit<'_> {
                 "with its first point in dwell {first} fewer dwells have one than with another offset of its clock"
             ));
         }
-        let found = clearest(offsets.iter().map(|offset| (self.off_m(&pair(offset)), offset)).collect());
+        let found = clearest_fit(offsets.iter().map(|offset| (self.off_m(&pair(offset)), offset)).collect());
         let offset = found.map_err(|rivals| match rivals {
             None => format!(
                 "so few points do not tell by how much the clocks are apart ({} offsets would do): set first_dwell, the dwell of the \
@@ -227,7 +228,7 @@ impl Fit<'_> {
         }
         let outside = match lost.is_empty() {
             true => String::new(),
-            false => format!(", {} in none and left out (line {})", lost.len(), listed(&lost)),
+            false => format!(", {} in none and left out (line {})", lost.len(), list_names(&lost)),
         };
         let how = format!(
             "of its {n} points {} were measured in dwells{outside}: its time `{began}` is {:.2} s of the recording's clock, give or take \
@@ -242,7 +243,7 @@ impl Fit<'_> {
 
 /// What fits clearly better than all else, or the two that come closest; nothing where too few points are in dwells to say.
 #[allow(clippy::type_complexity, reason = "two of what came in")]
-fn clearest<T: Copy>(mut all: Vec<(f64, T)>) -> Result<T, Option<[(f64, T); 2]>> {
+fn clearest_fit<T: Copy>(mut all: Vec<(f64, T)>) -> Result<T, Option<[(f64, T); 2]>> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     match all.as_slice() {
         [(_, only)] => Ok(*only),

@@ -60,7 +60,7 @@ pub fn parse(text: &str, to_m: f64, time: Option<&str>) -> Result<Table, String>
                 if is_header {
                     table.header = record.iter().map(str::to_owned).collect();
                 }
-                let time_at = time.map(|time| column(&table.header, time)).transpose()?;
+                let time_at = time.map(|time| column_index(&table.header, time)).transpose()?;
                 columns = Some((at, time_at));
                 if is_header {
                     continue;
@@ -87,7 +87,7 @@ pub fn parse(text: &str, to_m: f64, time: Option<&str>) -> Result<Table, String>
     }
     if time.is_some() {
         let times: Vec<(u64, &str)> = times.iter().map(|(line, text)| (*line, text.as_str())).collect();
-        let since_ns = clock::read(&times)?;
+        let since_ns = clock::parse_times(&times)?;
         table.began = times.first().map(|(_, text)| (*text).to_owned());
         let with_point = table.rows.iter_mut().filter(|row| row.point_m.is_some());
         with_point.zip(since_ns).for_each(|(row, time_ns)| row.time_ns = time_ns);
@@ -96,7 +96,7 @@ pub fn parse(text: &str, to_m: f64, time: Option<&str>) -> Result<Table, String>
 }
 
 /// Which column has a name.
-fn column(header: &[String], name: &str) -> Result<usize, String> {
+fn column_index(header: &[String], name: &str) -> Result<usize, String> {
     let found = header.iter().position(|column| column.trim_matches('"').eq_ignore_ascii_case(name.trim()));
     found.ok_or_else(|| match header.is_empty() {
         true => format!("it has no header, so no column is called `{name}`"),

@@ -75,8 +75,8 @@ impl Field {
 
     /// Replaces the coefficients by the best ones for `pulls`. Leaves them alone if the prior is degenerate.
     pub fn fit(&mut self, pulls: &[Pull], prior: &Prior) {
-        let mut lateral = precision(Self::sigmas(prior, false));
-        let mut normal = precision(Self::sigmas(prior, true));
+        let mut lateral = precision_matrix(Self::sigmas(prior, false));
+        let mut normal = precision_matrix(Self::sigmas(prior, true));
         let mut target = SMatrix::<f64, TERMS, 3>::zeros();
         for pull in pulls {
             let terms = self.terms(&pull.from_m);
@@ -115,6 +115,6 @@ impl Field {
     }
 }
 
-fn precision(sigmas: [f64; TERMS]) -> SMatrix<f64, TERMS, TERMS> {
+fn precision_matrix(sigmas: [f64; TERMS]) -> SMatrix<f64, TERMS, TERMS> {
     SMatrix::from_diagonal(&SVector::from(sigmas.map(|s| s.powi(-2))))
 }

@@ -30,16 +30,16 @@ struct Height {
 /// Corrections `a + b vx + c vy` that bring the seated tips of an alignment to the height of their cavities;
 /// the best first, a second where it is nearly as good.
 pub(super) fn planes(problem: &Problem, field: &Field) -> Vec<[f64; 3]> {
-    let heights = heights(problem, field);
+    let heights = site_heights(problem, field);
     let n = heights.len();
     let flat = heights.iter().map(|h| [-h.over_m, 0.0, 0.0]);
     let tilted = (0..if n < 3 { 0 } else { TRIES }).filter_map(|i| {
         // Co-prime strides visit many different triplets without chance.
-        through(&heights[i % n], &heights[(i * 7 + n / 3) % n], &heights[(i * 13 + 2 * n / 3) % n])
+        plane_through(&heights[i % n], &heights[(i * 7 + n / 3) % n], &heights[(i * 13 + 2 * n / 3) % n])
     });
     let (mut scored, mut top) = (Vec::new(), f64::NEG_INFINITY);
     for plane in flat.chain(tilted) {
-        if let Some(score) = score(problem, &heights, &plane, top - WORTH_LN) {
+        if let Some(score) = plane_ln_likelihood(problem, &heights, &plane, top - WORTH_LN) {
             top = f64::max(top, score);
             scored.push((score, plane));
         }
@@ -50,11 +50,11 @@ pub(super) fn planes(problem: &Problem, field: &Field) -> Vec<[f64; 3]> {
     [Some(best), second.map(|s| s.1)].into_iter().flatten().collect()
 }
 
-fn heights(problem: &Problem, field: &Field) -> Vec<Height> {
-    problem.sites.iter().filter_map(|s| height(problem, field, &s.at_m, s.weight)).collect()
+fn site_heights(problem: &Problem, field: &Field) -> Vec<Height> {
+    problem.sites.iter().filter_map(|s| site_height(problem, field, &s.at_m, s.weight)).collect()
 }
 
-fn height(problem: &Problem, field: &Field, at_m: &Vector3<f64>, weight: f64) -> Option<Height> {
+fn site_height(problem: &Problem, field: &Field, at_m: &Vector3<f64>, weight: f64) -> Option<Height> {
     let aligned = field.aligned_m(at_m);
     let cavity = problem.layout.points_m[*problem.layout.near(&aligned).first()? as usize];
     let gap = aligned - cavity;
@@ -63,14 +63,14 @@ fn height(problem: &Problem, field: &Field, at_m: &Vector3<f64>, weight: f64) ->
     (beside && gap.z.abs() < RANGE_M).then_some(Height { x: v.x, y: v.y, over_m: gap.z, weight })
 }
 
-fn through(a: &Height, b: &Height, c: &Height) -> Option<[f64; 3]> {
+fn plane_through(a: &Height, b: &Height, c: &Height) -> Option<[f64; 3]> {
     let rows = nalgebra::Matrix3::new(1.0, a.x, a.y, 1.0, b.x, b.y, 1.0, c.x, c.y);
     let planes = rows.try_inverse()? * -Vector3::new(a.over_m, b.over_m, c.over_m);
     planes.iter().all(|v| v.is_finite()).then(|| planes.into())
 }
 
 /// ln likelihood of heights with a plane; none where it is less than `least`.
-fn score(problem: &Problem, heights: &[Height], plane: &[f64; 3], least: f64) -> Option<f64> {
+fn plane_ln_likelihood(problem: &Problem, heights: &[Height], plane: &[f64; 3], least: f64) -> Option<f64> {
     let hover_m = problem.config.hover_min_mm * 1e-3..problem.config.hover_max_mm * 1e-3;
     let seat = 0.55 / (SIGMA_M * std::f64::consts::TAU.sqrt());
     let hover = 0.25 / (hover_m.end - hover_m.start);
@@ -110,11 +110,11 @@ mod tests {
             let config = AssociationConfig::default();
             let problem = Problem::new(&planted.board, &planted.tips, &BoardStart::Unknown, &config);
             let field = Field::none(planted.world_from_board.inverse(), Vector3::zeros());
-            let heights = heights(&problem, &field);
+            let heights = site_heights(&problem, &field);
             prop_assume!(!heights.is_empty());
-            let of_all = score(&problem, &heights, &plane, f64::NEG_INFINITY).expect("nothing was asked");
+            let of_all = plane_ln_likelihood(&problem, &heights, &plane, f64::NEG_INFINITY).expect("nothing was asked");
             let least = share * of_all;
-            match score(&problem, &heights, &plane, least) {
+            match plane_ln_likelihood(&problem, &heights, &plane, least) {
                 Some(score) => prop_assert_eq!(score, of_all),
                 None => prop_assert!(of_all < least),
             }

@@ -30,7 +30,7 @@ use crate::{Association, AssociationConfig, Board, TableError};
 use armcal_core::{DwellId, Pose};
 use nalgebra::Vector3;
 use problem::Problem;
-use refine::{Converged, Explanation, finish, settle};
+use refine::{Converged, Explanation, refine_field, refine_with_order};
 
 /// Explanations whose shifts by one cavity are looked at, at most.
 const SHIFTED: usize = 4;
@@ -91,27 +91,27 @@ fn explain(problem: &Problem, start: &BoardStart) -> Vec<Explanation> {
         return Vec::new();
     }
     let rough = match start {
-        BoardStart::Known(world_from_board) => search::around(problem, world_from_board),
-        BoardStart::Unknown => search::anywhere(problem),
+        BoardStart::Known(world_from_board) => search::around_pose(problem, world_from_board),
+        BoardStart::Unknown => search::without_pose(problem),
     };
     let mut settled = Vec::new();
     for field in rough {
         for plane in heights::planes(problem, &field) {
             let mut lifted = field.clone();
             lifted.lift(plane);
-            settled.push(settle(problem, lifted, problem.sigma_cap_m()));
+            settled.push(refine_field(problem, lifted, problem.sigma_cap_m()));
         }
     }
     let mut explanations = Vec::new();
     weigh(problem, settled, &mut explanations);
     for rank in 0..SHIFTED {
         let Some(base) = explanations.get(rank).map(|e| e.field.clone()) else { break };
-        let fewest = search::supporters(problem, &base) * 2 / 3;
+        let fewest = search::count_supporters(problem, &base) * 2 / 3;
         let shifted = problem.layout.steps_m().into_iter().filter_map(|step_m| {
             let mut shifted = base.clone();
             shifted.shift(step_m);
-            let worth = search::supporters(problem, &shifted) >= fewest;
-            worth.then(|| settle(problem, shifted, 0.5 * problem.sigma_cap_m()))
+            let worth = search::count_supporters(problem, &shifted) >= fewest;
+            worth.then(|| refine_field(problem, shifted, 0.5 * problem.sigma_cap_m()))
         });
         weigh(problem, shifted.collect(), &mut explanations);
     }
@@ -124,7 +124,7 @@ fn weigh(problem: &Problem, settled: Vec<Converged>, explanations: &mut Vec<Expl
     let by_order = NEGLIGIBLE_LN + ORDER_WORTH_LN * problem.weight.iter().sum::<f64>();
     for candidate in settled {
         if candidate.ln_posterior >= top - by_order {
-            keep(problem, explanations, finish(problem, candidate));
+            keep(problem, explanations, refine_with_order(problem, candidate));
         }
     }
 }

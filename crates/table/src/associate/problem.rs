@@ -54,13 +54,13 @@ impl<'a> Problem<'a> {
         start: &BoardStart,
         config: &'a AssociationConfig,
     ) -> Problem<'a> {
-        let positions = positions(tips, config.use_measured);
+        let positions = tip_positions(tips, config.use_measured);
         let (positions_m, measured) = (&positions.at_m, positions.measured);
         let finite = |p: &Vector3<f64>| p.iter().all(|v| v.is_finite());
         let index: Vec<usize> = (0..tips.len()).filter(|&i| finite(&positions_m[i])).collect();
         let tips_m: Vec<Vector3<f64>> = index.iter().map(|&i| positions_m[i]).collect();
         let layout = Layout::new(board);
-        let (sites, site_of) = sites(&tips_m);
+        let (sites, site_of) = group_sites(&tips_m);
         let weight = site_of.iter().map(|&s| 1.0 / sites[s].weight).collect();
         let free_pose = matches!(start, BoardStart::Unknown);
         let turn = config.rotation_sigma_deg.to_radians();
@@ -112,7 +112,7 @@ struct Positions {
 
 /// The tip of every dwell, by the sensor where most dwells have it; a dwell the sensor missed is placed by
 /// an affine map from prediction to measurement, fitted to the others, and is as uncertain as that map.
-fn positions(tips: &[DwellTip], use_measured: bool) -> Positions {
+fn tip_positions(tips: &[DwellTip], use_measured: bool) -> Positions {
     let predicted = || Positions {
         at_m: tips.iter().map(|t| t.predicted_m).collect(),
         extra_sigma_m: vec![0.0; tips.len()],
@@ -146,7 +146,7 @@ fn positions(tips: &[DwellTip], use_measured: bool) -> Positions {
 }
 
 /// Groups tips into places; returns them and the place of each tip.
-fn sites(tips_m: &[Vector3<f64>]) -> (Vec<Site>, Vec<usize>) {
+fn group_sites(tips_m: &[Vector3<f64>]) -> (Vec<Site>, Vec<usize>) {
     let mut first: Vec<Vector3<f64>> = Vec::new();
     let mut sum: Vec<(Vector3<f64>, f64)> = Vec::new();
     let mut site_of = Vec::with_capacity(tips_m.len());

@@ -42,31 +42,31 @@ pub(super) struct Converged {
 }
 
 /// Refines `field`, starting with a scatter of `sigma_m`.
-pub(super) fn settle(problem: &Problem, mut field: Field, sigma_m: f64) -> Converged {
+pub(super) fn refine_field(problem: &Problem, mut field: Field, sigma_m: f64) -> Converged {
     let mut sigma_m = sigma_m;
     let mut normal_known = !problem.free_pose || problem.layout.len() > 2;
     let fall = (tip_sigma_m(problem) / sigma_m).min(1.0).powf(1.0 / FALLING as f64);
     let mut least_m = sigma_m;
     let mut soft = vec![Vec::new(); problem.tips_m.len()];
     for step in 0..FALLING {
-        expect(problem, &field, sigma_m, normal_known, &mut soft);
+        expectation_step(problem, &field, sigma_m, normal_known, &mut soft);
         if problem.free_pose {
-            normal_known = !on_a_line(seats(problem, &field, &soft).into_iter().map(|m| (m.0, m.2)));
+            normal_known = !on_a_line(seat_matches(problem, &field, &soft).into_iter().map(|m| (m.0, m.2)));
             if step % POSE_EVERY == POSE_EVERY - 1 {
                 take_over_pose(problem, &mut field, &soft);
             }
         }
-        maximise(problem, &mut field, &soft, sigma_m);
+        maximisation_step(problem, &mut field, &soft, sigma_m);
         least_m *= fall;
-        sigma_m = scatter(problem, &field, &soft).max(least_m).min(problem.sigma_cap_m());
+        sigma_m = seat_scatter_m(problem, &field, &soft).max(least_m).min(problem.sigma_cap_m());
     }
-    let ln_likelihood = expect(problem, &field, sigma_m, normal_known, &mut soft);
+    let ln_likelihood = expectation_step(problem, &field, sigma_m, normal_known, &mut soft);
     let ln_posterior = ln_likelihood + ln_prior(problem, &field, sigma_m);
     Converged { field, sigma_m, normal_known, ln_posterior }
 }
 
 /// Takes the order of visits into account.
-pub(super) fn finish(problem: &Problem, settled: Converged) -> Explanation {
+pub(super) fn refine_with_order(problem: &Problem, settled: Converged) -> Explanation {
     let Converged { mut field, mut sigma_m, normal_known, .. } = settled;
     let mut stay = problem.stay;
     for _ in 0..FINAL {
@@ -75,8 +75,8 @@ pub(super) fn finish(problem: &Problem, settled: Converged) -> Explanation {
         if problem.free_pose {
             take_over_pose(problem, &mut field, &sequence.states);
         }
-        maximise(problem, &mut field, &sequence.states, sigma_m);
-        sigma_m = scatter(problem, &field, &sequence.states).min(problem.sigma_cap_m());
+        maximisation_step(problem, &mut field, &sequence.states, sigma_m);
+        sigma_m = seat_scatter_m(problem, &field, &sequence.states).min(problem.sigma_cap_m());
     }
     let sequence = Sequence::of(problem, &field, &Emission::new(problem, sigma_m, normal_known), stay);
     let best = sequence.best();
@@ -95,7 +95,7 @@ fn ln_prior(problem: &Problem, field: &Field, sigma_m: f64) -> f64 {
 }
 
 /// Cavities and the tips seated in them, as far as they are.
-pub(super) fn seats(problem: &Problem, field: &Field, states: &[Vec<(State, f64)>]) -> Vec<Match> {
+pub(super) fn seat_matches(problem: &Problem, field: &Field, states: &[Vec<(State, f64)>]) -> Vec<Match> {
     let mut matches = Vec::new();
     for (i, tip) in problem.tips_m.iter().enumerate() {
         for &(state, p) in &states[i] {
@@ -110,7 +110,7 @@ pub(super) fn seats(problem: &Problem, field: &Field, states: &[Vec<(State, f64)
 }
 
 /// Fills `soft` with what each dwell may be, one by one; the logarithm of the likelihood of all.
-fn expect(
+fn expectation_step(
     problem: &Problem,
     field: &Field,
     sigma_m: f64,
@@ -134,7 +134,7 @@ fn expect(
     ln_likelihood
 }
 
-fn maximise(problem: &Problem, field: &mut Field, states: &[Vec<(State, f64)>], sigma_m: f64) {
+fn maximisation_step(problem: &Problem, field: &mut Field, states: &[Vec<(State, f64)>], sigma_m: f64) {
     let emission = Emission::new(problem, sigma_m, true);
     let mut pulls = Vec::with_capacity(problem.tips_m.len());
     for (i, tip) in problem.tips_m.iter().enumerate() {
@@ -171,14 +171,14 @@ fn maximise(problem: &Problem, field: &mut Field, states: &[Vec<(State, f64)>], 
 
 /// Moves the supposed board onto the seated tips; the field starts again from nothing.
 fn take_over_pose(problem: &Problem, field: &mut Field, states: &[Vec<(State, f64)>]) {
-    let board_from_board = fit_rigid(&seats(problem, field, states), &armcal_core::Pose::identity());
+    let board_from_board = fit_rigid(&seat_matches(problem, field, states), &armcal_core::Pose::identity());
     let centre_m = field.centre_m;
     *field = Field::none(board_from_board.inverse() * field.board_from_world, centre_m);
 }
 
 /// Scatter of seated tips about their cavities per axis, with the configured one as a few places' worth
 /// of prior (the mode of an inverse-gamma posterior).
-fn scatter(problem: &Problem, field: &Field, states: &[Vec<(State, f64)>]) -> f64 {
+fn seat_scatter_m(problem: &Problem, field: &Field, states: &[Vec<(State, f64)>]) -> f64 {
     let (mut squares, mut count) = (0.0, 0.0);
     for (i, tip) in problem.tips_m.iter().enumerate().filter(|(i, _)| problem.extra_sigma_m[*i] == 0.0) {
         let aligned_m = field.aligned_m(tip);

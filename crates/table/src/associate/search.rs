@@ -33,14 +33,14 @@ const STRETCH: f64 = 0.04;
 const SLACK: f64 = 0.2;
 
 /// Rough alignments in the pose given.
-pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
+pub(super) fn around_pose(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
     let board_from_world = world_from_board.inverse();
     let middle_m = problem.middle_m(&board_from_world);
     let supposed = Field::none(board_from_world, middle_m);
     let sites: Vec<(Vector3<f64>, f64)> =
         problem.sites.iter().map(|s| (supposed.supposed_m(&s.at_m) - middle_m, s.weight)).collect();
-    let shifts = steps(GRID_SPAN * problem.prior.offset_m, GRID_M);
-    let turns = steps(GRID_SPAN * problem.config.rotation_sigma_deg.to_radians(), GRID_RAD);
+    let shifts = symmetric_steps(GRID_SPAN * problem.prior.offset_m, GRID_M);
+    let turns = symmetric_steps(GRID_SPAN * problem.config.rotation_sigma_deg.to_radians(), GRID_RAD);
     let turned = |turn_rad: &f64| -> Vec<(Vector3<f64>, f64)> {
         let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), *turn_rad);
         sites.iter().map(|(v, w)| (rotation * v + middle_m, *w)).collect()
@@ -48,7 +48,7 @@ pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
     let turned: Vec<_> = turns.iter().map(turned).collect();
     let (mut scored, mut highest) = (Vec::new(), f64::NEG_INFINITY);
     for (turn, sites) in turned.iter().enumerate() {
-        for (score, shift) in shifted(problem, sites, &shifts) {
+        for (score, shift) in score_shifts(problem, sites, &shifts) {
             if score >= WORTH * highest {
                 highest = highest.max(score);
                 scored.push((score, (turn, shift)));
@@ -61,13 +61,13 @@ pub(super) fn around(problem: &Problem, world_from_board: &Pose) -> Vec<Field> {
         field.turn_and_shift(turns[*turn], *shift);
         field
     };
-    different(problem, scored, place, false).iter().map(field).collect()
+    distinct_alignments(problem, scored, place, false).iter().map(field).collect()
 }
 
 /// Support of the sites (place on the board, weight) at every shift of the grid, less what a far shift costs.
 ///
 /// Site by site and cavity by cavity: each supports the few shifts that bring the one to the other.
-fn shifted(
+fn score_shifts(
     problem: &Problem,
     sites: &[(Vector3<f64>, f64)],
     shifts: &[f64],
@@ -103,7 +103,7 @@ fn shifted(
 }
 
 /// Rough alignments without a pose.
-pub(super) fn anywhere(problem: &Problem) -> Vec<Field> {
+pub(super) fn without_pose(problem: &Problem) -> Vec<Field> {
     let up = Unit::new_normalize(Vector3::from(problem.config.normal_in_world));
     let mut poses = by_triplets(problem, &up);
     poses.extend(by_pairs(problem, &up));
@@ -117,25 +117,28 @@ pub(super) fn anywhere(problem: &Problem) -> Vec<Field> {
     let n = problem.layout.len() as f64;
     let centre_m = problem.layout.points_m.iter().sum::<Vector3<f64>>() / n;
     let place = |pose: &Pose, site: usize| pose.transform_point(&problem.sites[site].at_m.into()).coords;
-    different(problem, scored, place, true).into_iter().map(|pose| Field::none(pose, centre_m)).collect()
+    distinct_alignments(problem, scored, place, true)
+        .into_iter()
+        .map(|pose| Field::none(pose, centre_m))
+        .collect()
 }
 
 /// How much all places support an alignment; none where that is less than `least`.
 pub(super) fn support_of_all(problem: &Problem, board_from_world: &Pose, least: f64) -> Option<f64> {
     let (rotation, shift) =
         (board_from_world.rotation.to_rotation_matrix(), &board_from_world.translation.vector);
-    let of = |site: &Site| (site.weight, support(problem, &(rotation * site.at_m + shift), true).1);
+    let of = |site: &Site| (site.weight, cavity_support(problem, &(rotation * site.at_m + shift), true).1);
     sum_of_at_least(least, (problem.sites_weight, 1.0), problem.sites.iter().map(of))
 }
 
 /// How many places an alignment brings to a cavity, seen along the board's normal.
-pub(super) fn supporters(problem: &Problem, field: &Field) -> usize {
-    let supports = |s: &&Site| support(problem, &field.aligned_m(&s.at_m), false).1 > 0.0;
+pub(super) fn count_supporters(problem: &Problem, field: &Field) -> usize {
+    let supports = |s: &&Site| cavity_support(problem, &field.aligned_m(&s.at_m), false).1 > 0.0;
     problem.sites.iter().filter(supports).count()
 }
 
 /// The cavity that supports a place, and how much, from 0 to 1.
-fn support(problem: &Problem, at_m: &Vector3<f64>, in_space: bool) -> (u32, f64) {
+fn cavity_support(problem: &Problem, at_m: &Vector3<f64>, in_space: bool) -> (u32, f64) {
     let reach_m = REACH * problem.layout.spacing_m;
     let [low_m, high_m] = problem.layout.heights_m;
     if in_space && (at_m.z > high_m + reach_m || at_m.z < low_m - reach_m) {
@@ -150,7 +153,7 @@ fn support(problem: &Problem, at_m: &Vector3<f64>, in_space: bool) -> (u32, f64)
 
 /// The best alignments of which each puts at least some places into other cavities than those before it; `place_of` is where on the
 /// board an alignment puts a site.
-fn different<T>(
+fn distinct_alignments<T>(
     problem: &Problem,
     mut scored: Vec<(f64, T)>,
     place_of: impl Fn(&T, usize) -> Vector3<f64>,
@@ -161,7 +164,7 @@ fn different<T>(
     let enough = (problem.sites.len() / 8).max(1);
     let mut kept: Vec<(T, Vec<u32>)> = Vec::new();
     for (_, rough) in scored.into_iter().take(LOOK).take_while(|s| s.0 >= least) {
-        let cavity = |site: usize| support(problem, &place_of(&rough, site), in_space).0;
+        let cavity = |site: usize| cavity_support(problem, &place_of(&rough, site), in_space).0;
         let cavities: Vec<u32> = (0..problem.sites.len()).map(cavity).collect();
         let differs = |other: &Vec<u32>| cavities.iter().zip(other).filter(|(a, b)| a != b).count() >= enough;
         if kept.iter().all(|(_, other)| differs(other)) {
@@ -183,22 +186,22 @@ fn by_triplets(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
     let mut poses = Vec::new();
     let mut matched = 0;
     for draw in 0..DRAWS {
-        let [a, b, c] = draw3(draw, sites.len()).map(|i| sites[i].at_m);
+        let [a, b, c] = draw_triplet(draw, sites.len()).map(|i| sites[i].at_m);
         let [ab, ac, bc] = [(b - a).norm(), (c - a).norm(), (c - b).norm()];
         let height = (b - a).cross(&(c - a)).norm() / ab.max(ac).max(bc).max(1e-9);
         if ab.min(ac).min(bc) < far_m || height < 0.5 * far_m {
             continue;
         }
-        let Some(in_world) = frame(&a, &b, &c) else { continue };
+        let Some(in_world) = frame_from_points(&a, &b, &c) else { continue };
         let before = poses.len();
-        let [of_ac, of_bc] = [ac, bc].map(|distance_m| tolerance(problem, distance_m));
+        let [of_ac, of_bc] = [ac, bc].map(|distance_m| distance_tolerance_m(problem, distance_m));
         // As far from each cavity as c is from a.
         let like_ac =
             |i: usize| (0..cavities.len()).filter(move |k| *k != i && (apart_m[i][*k] - ac).abs() < of_ac);
         let thirds: Vec<Vec<usize>> = (0..cavities.len()).map(|i| like_ac(i).collect()).collect();
-        for &(_, i, j) in pairs.like(ab, tolerance(problem, ab)) {
+        for &(_, i, j) in pairs.like(ab, distance_tolerance_m(problem, ab)) {
             for &k in thirds[i].iter().filter(|k| **k != j && (apart_m[j][**k] - bc).abs() < of_bc) {
-                if let Some(on_board) = frame(&cavities[i], &cavities[j], &cavities[k]) {
+                if let Some(on_board) = frame_from_points(&cavities[i], &cavities[j], &cavities[k]) {
                     let world_from_board = in_world * on_board.inverse();
                     if (world_from_board.rotation * Vector3::z()).dot(up) >= cos_limit {
                         poses.push(world_from_board.inverse());
@@ -222,15 +225,15 @@ fn by_pairs(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
     let mut poses = Vec::new();
     let mut matched = 0;
     for draw in 0..DRAWS {
-        let [a, b, _] = draw3(draw, sites.len()).map(|i| sites[i].at_m);
+        let [a, b, _] = draw_triplet(draw, sites.len()).map(|i| sites[i].at_m);
         let ab = (b - a).norm();
         if ab < far_m {
             continue;
         }
-        let in_world = upright(&a, &b, up);
+        let in_world = upright_frame(&a, &b, up);
         let before = poses.len();
-        for &(_, i, j) in pairs.like(ab, tolerance(problem, ab)) {
-            let on_board = upright(&cavities[i], &cavities[j], &Vector3::z_axis());
+        for &(_, i, j) in pairs.like(ab, distance_tolerance_m(problem, ab)) {
+            let on_board = upright_frame(&cavities[i], &cavities[j], &Vector3::z_axis());
             let world_from_board = in_world * on_board.inverse();
             poses.push(world_from_board.inverse());
         }
@@ -242,7 +245,7 @@ fn by_pairs(problem: &Problem, up: &Unit<Vector3<f64>>) -> Vec<Pose> {
     poses
 }
 
-fn tolerance(problem: &Problem, distance_m: f64) -> f64 {
+fn distance_tolerance_m(problem: &Problem, distance_m: f64) -> f64 {
     STRETCH * distance_m + SLACK * problem.layout.spacing_m
 }
 
@@ -274,14 +277,14 @@ impl Pairs {
 }
 
 /// The frame with origin `a`, x towards `b`, and `c` in the upper half of the xy plane.
-fn frame(a: &Vector3<f64>, b: &Vector3<f64>, c: &Vector3<f64>) -> Option<Pose> {
+fn frame_from_points(a: &Vector3<f64>, b: &Vector3<f64>, c: &Vector3<f64>) -> Option<Pose> {
     let x = (b - a).try_normalize(1e-9)?;
     let z = x.cross(&(c - a)).try_normalize(1e-9)?;
     Some(pose_of(a, &x, &z))
 }
 
 /// The frame with origin `a`, x towards `b`, and z as near to `up` as that allows.
-fn upright(a: &Vector3<f64>, b: &Vector3<f64>, up: &Unit<Vector3<f64>>) -> Pose {
+fn upright_frame(a: &Vector3<f64>, b: &Vector3<f64>, up: &Unit<Vector3<f64>>) -> Pose {
     let x = (b - a).try_normalize(1e-9).unwrap_or_else(Vector3::x);
     let beside = |v: &Vector3<f64>| (v - x * x.dot(v)).try_normalize(0.05);
     let z = beside(up).or_else(|| beside(&Vector3::x())).or_else(|| beside(&Vector3::y()));
@@ -296,7 +299,7 @@ fn pose_of(origin: &Vector3<f64>, x: &Vector3<f64>, z: &Vector3<f64>) -> Pose {
 
 /// Three indices below `n`, evenly spread over all of them as `draw` counts up (R3 sequence, with the inverse
 /// powers of the root of x^4 = x + 1).
-fn draw3(draw: usize, n: usize) -> [usize; 3] {
+fn draw_triplet(draw: usize, n: usize) -> [usize; 3] {
     const STEP: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
     STEP.map(|step| {
         let at = (0.5 + step * (draw + 1) as f64).fract();
@@ -305,7 +308,7 @@ fn draw3(draw: usize, n: usize) -> [usize; 3] {
 }
 
 /// From `-span` to `span` in steps, zero among them.
-fn steps(span: f64, step: f64) -> Vec<f64> {
+fn symmetric_steps(span: f64, step: f64) -> Vec<f64> {
     let half = (span / step).round() as i32;
     (-half..=half).map(|i| f64::from(i) * step).collect()
 }

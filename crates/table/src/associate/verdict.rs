@@ -2,7 +2,7 @@
 
 use super::emission::State;
 use super::problem::Problem;
-use super::refine::{Explanation, seats};
+use super::refine::{Explanation, seat_matches};
 use super::rigid::fit_rigid;
 use super::{BoardStart, DwellTip};
 use crate::{Assignment, Association, Board, Place, TableError};
@@ -38,7 +38,8 @@ pub(super) fn judge(
     let Some(best) = explanations.first() else {
         if tips.is_empty() {
             let board_in_world = world_from_board(start, problem, None);
-            let warnings = warnings(board, tips, start, problem, &assignments, None, &board_in_world);
+            let warnings =
+                association_warnings(board, tips, start, problem, &assignments, None, &board_in_world);
             return Ok(Association { assignments, board_in_world, warnings });
         }
         return Err(TableError::DoesNotFit {
@@ -47,16 +48,17 @@ pub(super) fn judge(
             best_rms_m: f64::NAN,
         });
     };
-    let weights = weights(explanations);
+    let weights = posterior_weights(explanations);
     for (i, &input) in problem.index.iter().enumerate() {
-        let chances = chances(explanations, &weights, i);
-        let (place, distance_m) = place(problem, best, i, &chances);
+        let chances = state_probabilities(explanations, &weights, i);
+        let (place, distance_m) = assign_place(problem, best, i, &chances);
         assignments[input].place = place;
         assignments[input].distance_m = distance_m;
     }
-    fits(board, problem, best, &assignments)?;
+    check_fit(board, problem, best, &assignments)?;
     let board_in_world = world_from_board(start, problem, Some(best));
-    let warnings = warnings(board, tips, start, problem, &assignments, Some(best), &board_in_world);
+    let warnings =
+        association_warnings(board, tips, start, problem, &assignments, Some(best), &board_in_world);
     Ok(Association { assignments, board_in_world, warnings })
 }
 
@@ -74,7 +76,7 @@ pub(super) fn normal_is_possible(problem: &Problem, e: &Explanation) -> bool {
     !problem.free_pose || !e.normal_known || normal.angle(&up).to_degrees() <= problem.config.max_normal_deg
 }
 
-fn weights(explanations: &[Explanation]) -> Vec<f64> {
+fn posterior_weights(explanations: &[Explanation]) -> Vec<f64> {
     let top = explanations.iter().map(|e| e.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let raw: Vec<f64> = explanations.iter().map(|e| (e.ln_posterior - top).exp()).collect();
     let total: f64 = raw.iter().sum();
@@ -82,7 +84,7 @@ fn weights(explanations: &[Explanation]) -> Vec<f64> {
 }
 
 /// Probability of every state of dwell `i`, over all explanations.
-fn chances(explanations: &[Explanation], weights: &[f64], i: usize) -> BTreeMap<State, f64> {
+fn state_probabilities(explanations: &[Explanation], weights: &[f64], i: usize) -> BTreeMap<State, f64> {
     let mut chances = BTreeMap::new();
     for (explanation, weight) in explanations.iter().zip(weights) {
         for &(state, p) in &explanation.sequence.states[i] {
@@ -92,7 +94,12 @@ fn chances(explanations: &[Explanation], weights: &[f64], i: usize) -> BTreeMap<
     chances
 }
 
-fn place(problem: &Problem, best: &Explanation, i: usize, chances: &BTreeMap<State, f64>) -> (Place, f64) {
+fn assign_place(
+    problem: &Problem,
+    best: &Explanation,
+    i: usize,
+    chances: &BTreeMap<State, f64>,
+) -> (Place, f64) {
     let aligned_m = best.field.aligned_m(&problem.tips_m[i]);
     let sure = problem.config.min_confidence;
     let (mut seat, mut hover) = (0.0, 0.0);
@@ -110,7 +117,9 @@ fn place(problem: &Problem, best: &Explanation, i: usize, chances: &BTreeMap<Sta
     let over = seat + hover;
     let mut cavities: Vec<(usize, f64)> = by_cavity.into_iter().collect();
     cavities.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let Some(&(k, _)) = cavities.first().filter(|_| over >= 0.5) else { return nowhere(problem, aligned_m) };
+    let Some(&(k, _)) = cavities.first().filter(|_| over >= 0.5) else {
+        return place_off_cavity(problem, aligned_m);
+    };
     let gap = aligned_m - problem.layout.points_m[k];
     let name = problem.layout.names[k].clone();
     let part = |state: State| chances.get(&state).copied().unwrap_or(0.0);
@@ -142,7 +151,7 @@ fn place(problem: &Problem, best: &Explanation, i: usize, chances: &BTreeMap<Sta
 }
 
 /// A dwell at no cavity: in free space, or near the board and unexplained.
-fn nowhere(problem: &Problem, aligned_m: Vector3<f64>) -> (Place, f64) {
+fn place_off_cavity(problem: &Problem, aligned_m: Vector3<f64>) -> (Place, f64) {
     let (k, distance_m) = problem.layout.nearest(&aligned_m);
     if distance_m * 1e3 > problem.config.near_mm {
         return (Place::FreeSpace, f64::NAN);
@@ -159,7 +168,12 @@ fn nowhere(problem: &Problem, aligned_m: Vector3<f64>) -> (Place, f64) {
 }
 
 /// Refuses a board that was not the one visited.
-fn fits(board: &Board, problem: &Problem, best: &Explanation, all: &[Assignment]) -> Result<(), TableError> {
+fn check_fit(
+    board: &Board,
+    problem: &Problem,
+    best: &Explanation,
+    all: &[Assignment],
+) -> Result<(), TableError> {
     let near = all.iter().filter(|a| a.place != Place::FreeSpace).count();
     let lost = all.iter().filter(|a| matches!(a.place, Place::Unassigned { .. })).count();
     let explained = near - lost;
@@ -188,7 +202,8 @@ fn world_from_board(start: &BoardStart, problem: &Problem, best: Option<&Explana
     match best {
         Some(e) => {
             let world_from_supposed = e.field.board_from_world.inverse();
-            world_from_supposed * fit_rigid(&seats(problem, &e.field, &e.sequence.states), &Pose::identity())
+            world_from_supposed
+                * fit_rigid(&seat_matches(problem, &e.field, &e.sequence.states), &Pose::identity())
         }
         None => match start {
             BoardStart::Known(pose) => *pose,
@@ -197,7 +212,7 @@ fn world_from_board(start: &BoardStart, problem: &Problem, best: Option<&Explana
     }
 }
 
-fn warnings(
+fn association_warnings(
     board: &Board,
     tips: &[DwellTip],
     start: &BoardStart,
@@ -221,7 +236,7 @@ fn warnings(
     let lost = count(|p| matches!(p, Place::Unassigned { .. }));
     let near = all.len() - count(|p| matches!(p, Place::FreeSpace));
     if ambiguous > 0 {
-        warn(Severity::Inadequate, "association-ambiguous", ambiguity(all, ambiguous));
+        warn(Severity::Inadequate, "association-ambiguous", ambiguity_message(all, ambiguous));
     }
     if seated < config.min_seated {
         let message = format!(
@@ -268,7 +283,7 @@ fn warnings(
     warnings
 }
 
-fn ambiguity(all: &[Assignment], count: usize) -> String {
+fn ambiguity_message(all: &[Assignment], count: usize) -> String {
     let example = all.iter().find_map(|a| match &a.place {
         Place::Ambiguous { cavities } => {
             Some(format!("dwell {} may be {}", a.dwell.dwell, cavities.join(" or ")))

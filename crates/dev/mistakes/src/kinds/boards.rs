@@ -6,53 +6,55 @@ use crate::{Draw, Error};
 use toml::{Table, Value};
 
 pub const KINDS: &[Kind] = &[
-    whole("board-drawn-from-below", "board-mirrored", BOARD, |s, _| drawn(s, |mm| mm[1] = -mm[1])),
-    whole("board-x-mirrored", "board-mirrored", BOARD, |s, _| drawn(s, |mm| mm[0] = -mm[0])),
-    whole("board-x-and-y-swapped", "board-mirrored", BOARD, |s, _| drawn(s, |mm| mm.swap(0, 1))),
+    whole("board-drawn-from-below", "board-mirrored", BOARD, |s, _| change_cavities(s, |mm| mm[1] = -mm[1])),
+    whole("board-x-mirrored", "board-mirrored", BOARD, |s, _| change_cavities(s, |mm| mm[0] = -mm[0])),
+    whole("board-x-and-y-swapped", "board-mirrored", BOARD, |s, _| change_cavities(s, |mm| mm.swap(0, 1))),
     whole("board-turned-by-a-quarter", "board-turned", BOARD, |s, _| {
-        drawn(s, |mm| *mm = [-mm[1], mm[0], mm[2]])
+        change_cavities(s, |mm| *mm = [-mm[1], mm[0], mm[2]])
     }),
     whole("board-turned-by-a-half", "board-turned", BOARD, |s, _| {
-        drawn(s, |mm| *mm = [-mm[0], -mm[1], mm[2]])
+        change_cavities(s, |mm| *mm = [-mm[0], -mm[1], mm[2]])
     }),
     whole("board-turned-a-little", "board-turned", BOARD, turned_a_little),
-    whole("board-z-down", "board-turned", BOARD, |s, _| drawn(s, |mm| *mm = [mm[0], -mm[1], -mm[2] - 12.0])),
-    whole("board-shrunk", "board-scale", BOARD, shrunk),
-    whole("board-stretched-along-x", "board-scale", BOARD, stretched),
+    whole("board-z-down", "board-turned", BOARD, |s, _| {
+        change_cavities(s, |mm| *mm = [mm[0], -mm[1], -mm[2] - 12.0])
+    }),
+    whole("board-shrunk", "board-scale", BOARD, scale_board),
+    whole("board-stretched-along-x", "board-scale", BOARD, stretch_board),
     whole("board-in-metres", "board-unit", BOARD, |s, _| {
-        drawn(s, |mm| mm.iter_mut().for_each(|v| *v *= 1e-3))
+        change_cavities(s, |mm| mm.iter_mut().for_each(|v| *v *= 1e-3))
     }),
     whole("board-in-inches", "board-unit", BOARD, |s, _| {
-        drawn(s, |mm| mm.iter_mut().for_each(|v| *v /= 25.4))
+        change_cavities(s, |mm| mm.iter_mut().for_each(|v| *v /= 25.4))
     }),
     whole("board-of-another-pitch", "wrong-board", BOARD, another_pitch),
     whole("board-of-another-make", "wrong-board", BOARD, another_make),
     whole("board-origin-at-a-corner", "board-moved", BOARD, |s, _| {
-        drawn(s, |mm| *mm = [mm[0] + 110.0, mm[1] + 150.0, mm[2]])
+        change_cavities(s, |mm| *mm = [mm[0] + 110.0, mm[1] + 150.0, mm[2]])
     }),
-    whole("board-slid-under-its-markers", "board-moved", TABLE, slid),
+    whole("board-slid-under-its-markers", "board-moved", TABLE, slide_board),
     whole("seats-higher-than-drawn", "seat-height", BOARD, seat_height),
     whole("line-of-cavities-deeper", "seat-height", BOARD, line_deeper),
-    kind("one-cavity-mistyped", "board-typo", BOARD, mistyped),
-    whole("two-cavities-swapped-in-the-file", "board-typo", BOARD, swapped),
+    kind("one-cavity-mistyped", "board-typo", BOARD, mistype_cavity),
+    whole("two-cavities-swapped-in-the-file", "board-typo", BOARD, swap_cavities),
     whole("visiting-order-backwards", "visiting-order", BOARD, visiting_order),
     whole("tilt-of-the-other-sign", "tilt-declared-wrong", BOARD, |s, _| {
-        tilts(s, |roll, pitch| [-roll, -pitch])
+        change_tilts(s, |roll, pitch| [-roll, -pitch])
     }),
     whole("roll-and-pitch-swapped", "tilt-declared-wrong", BOARD, |s, _| {
-        tilts(s, |roll, pitch| [pitch, roll])
+        change_tilts(s, |roll, pitch| [pitch, roll])
     }),
     whole("tilt-in-radians", "tilt-declared-wrong", BOARD, |s, _| {
-        tilts(s, |roll, pitch| [roll.to_radians(), pitch.to_radians()])
+        change_tilts(s, |roll, pitch| [roll.to_radians(), pitch.to_radians()])
     }),
-    whole("tilt-not-declared", "tilt-declared-wrong", BOARD, |s, _| tilts(s, |_, _| [0.0, 0.0])),
+    whole("tilt-not-declared", "tilt-declared-wrong", BOARD, |s, _| change_tilts(s, |_, _| [0.0, 0.0])),
     whole("tilts-of-other-recordings", "tilt-declared-wrong", BOARD, tilts_shifted),
-    whole("tilt-pivot-elsewhere", "tilt-declared-wrong", BOARD, pivot),
+    whole("tilt-pivot-elsewhere", "tilt-declared-wrong", BOARD, move_pivot),
     whole("board-upside-down-placed", "board-turned", TABLE, placed_upside_down),
     whole("board-placed-beside-its-subject", "board-moved", TABLE, placed_beside),
 ];
 
-fn drawn(session: &mut Session, change: fn(&mut [f64; 3])) {
+fn change_cavities(session: &mut Session, change: fn(&mut [f64; 3])) {
     session.cavities(|_, mm| change(mm));
 }
 
@@ -61,12 +63,12 @@ fn turned_a_little(session: &mut Session, draw: &mut Draw) {
     session.cavities(|_, mm| *mm = [cos * mm[0] - sin * mm[1], sin * mm[0] + cos * mm[1], mm[2]]);
 }
 
-fn shrunk(session: &mut Session, draw: &mut Draw) {
+fn scale_board(session: &mut Session, draw: &mut Draw) {
     let factor = 1.0 + draw.signed(0.015, 0.05);
     session.cavities(|_, mm| mm.iter_mut().for_each(|v| *v *= factor));
 }
 
-fn stretched(session: &mut Session, draw: &mut Draw) {
+fn stretch_board(session: &mut Session, draw: &mut Draw) {
     let factor = 1.0 + draw.signed(0.02, 0.06);
     session.cavities(|_, mm| mm[0] *= factor);
 }
@@ -90,7 +92,7 @@ fn another_make(session: &mut Session, _: &mut Draw) {
 }
 
 /// The plate with the markers was knocked between recordings; the board stands where it stood.
-fn slid(session: &mut Session, draw: &mut Draw) {
+fn slide_board(session: &mut Session, draw: &mut Draw) {
     let offset = draw.direction() * draw.uniform(0.008, 0.025);
     session.poses(crate::session::Body::Table, |at, p, _| {
         if at.recording >= 1 {
@@ -109,7 +111,7 @@ fn line_deeper(session: &mut Session, draw: &mut Draw) {
     session.cavities(|i, mm| mm[2] += if i >= 20 { height } else { 0.0 });
 }
 
-fn mistyped(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn mistype_cavity(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let (cavity, axis) = (draw.pick(33), draw.pick(2));
     let error = draw.signed(4.0, 9.0);
     session.cavities(|i, mm| mm[axis] += if i == cavity { error } else { 0.0 });
@@ -118,7 +120,7 @@ fn mistyped(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error
     Ok(vec![name])
 }
 
-fn swapped(session: &mut Session, draw: &mut Draw) {
+fn swap_cavities(session: &mut Session, draw: &mut Draw) {
     let first = draw.pick(19);
     let mut all = Vec::new();
     session.cavities(|_, mm| all.push(*mm));
@@ -132,7 +134,7 @@ fn visiting_order(session: &mut Session, _: &mut Draw) {
     session.set(&["table", "association", "visiting_order"], order);
 }
 
-fn tilts(session: &mut Session, change: fn(f64, f64) -> [f64; 2]) {
+fn change_tilts(session: &mut Session, change: fn(f64, f64) -> [f64; 2]) {
     for entry in session.entries().iter_mut().filter_map(Value::as_table_mut) {
         let tilt = |key: &str| entry["tilt"].get(key).and_then(Value::as_float).unwrap_or_default();
         let [roll, pitch] = change(tilt("roll_deg"), tilt("pitch_deg"));
@@ -150,7 +152,7 @@ fn tilts_shifted(session: &mut Session, _: &mut Draw) {
     }
 }
 
-fn pivot(session: &mut Session, draw: &mut Draw) {
+fn move_pivot(session: &mut Session, draw: &mut Draw) {
     let z = -60.0 + draw.signed(30.0, 60.0);
     let xyz: Vec<Value> = [draw.signed(10.0, 40.0), 0.0, z].map(Value::Float).to_vec();
     if let Some(Value::Table(mechanism)) = session.board.as_mut().and_then(|b| b.get_mut("mechanism")) {
@@ -158,16 +160,16 @@ fn pivot(session: &mut Session, draw: &mut Draw) {
     }
 }
 
-fn placed(session: &mut Session, xyz_m: [f64; 3], rpy_deg: [f64; 3]) {
+fn place_board(session: &mut Session, xyz_m: [f64; 3], rpy_deg: [f64; 3]) {
     session.set(&["table", "at", "xyz_m"], xyz_m.map(Value::Float).to_vec());
     session.set(&["table", "at", "rpy_deg"], rpy_deg.map(Value::Float).to_vec());
 }
 
 fn placed_upside_down(session: &mut Session, _: &mut Draw) {
-    placed(session, [0.0; 3], [180.0, 0.0, 0.0]);
+    place_board(session, [0.0; 3], [180.0, 0.0, 0.0]);
 }
 
 fn placed_beside(session: &mut Session, draw: &mut Draw) {
     let xyz = [draw.signed(0.02, 0.08), draw.signed(0.02, 0.08), draw.signed(0.005, 0.02)];
-    placed(session, xyz, [0.0; 3]);
+    place_board(session, xyz, [0.0; 3]);
 }

@@ -1,28 +1,28 @@
 //! Encoders and drivers that fail, and readings that are no readings.
 
-use super::{ALL, Kind, each, joint, set_points, whole};
+use super::{ALL, Kind, change_readings, joint, set_points, whole};
 use crate::Draw;
 use crate::session::{Rest, Session};
 
 pub const KINDS: &[Kind] = &[
-    joint("joint-frozen-throughout", "joint-stuck", 0, |s, _, j| frozen(s, j, 0.0)),
-    joint("joint-frozen-from-the-middle", "joint-stuck", 0, |s, _, j| frozen(s, j, 0.45)),
+    joint("joint-frozen-throughout", "joint-stuck", 0, |s, _, j| freeze_joint(s, j, 0.0)),
+    joint("joint-frozen-from-the-middle", "joint-stuck", 0, |s, _, j| freeze_joint(s, j, 0.45)),
     joint("joint-always-zero", "joint-stuck", 0, |s, _, j| s.joints(|_, q| q[j] = 0.0)),
-    whole("set-points-recorded", "setpoints-recorded", ALL, set_points::recorded),
-    whole("set-point-topic-in-pipeline", "setpoints-recorded", ALL, set_points::named),
-    joint("encoder-slips-once", "joint-zero-event", 1, slips),
-    joint("encoder-wraps-early", "encoder-wrap", 0, wraps),
-    joint("encoder-saturates", "saturated-joint", 0, saturates),
-    whole("encoder-coarse", "quantised", ALL, coarse),
-    whole("encoder-stale", "stale-encoder", ALL, stale),
-    whole("encoder-filtered", "filtered-encoder", ALL, filtered),
-    whole("encoder-noisy", "noise-underdeclared", ALL, noisy),
-    joint("encoder-spikes", "outliers", 0, spikes),
-    whole("driver-resets-to-zero", "outliers", ALL, resets),
+    whole("set-points-recorded", "setpoints-recorded", ALL, set_points::replace_readings),
+    whole("set-point-topic-in-pipeline", "setpoints-recorded", ALL, set_points::add_command_topic),
+    joint("encoder-slips-once", "joint-zero-event", 1, slip_encoder),
+    joint("encoder-wraps-early", "encoder-wrap", 0, wrap_encoder),
+    joint("encoder-saturates", "saturated-joint", 0, saturate_encoder),
+    whole("encoder-coarse", "quantised", ALL, coarsen_readings),
+    whole("encoder-stale", "stale-encoder", ALL, hold_readings),
+    whole("encoder-filtered", "filtered-encoder", ALL, filter_readings),
+    whole("encoder-noisy", "noise-underdeclared", ALL, add_noise),
+    joint("encoder-spikes", "outliers", 0, add_spikes),
+    whole("driver-resets-to-zero", "outliers", ALL, reset_readings),
     whole("encoder-not-a-number", "non-finite", ALL, not_a_number),
 ];
 
-fn frozen(session: &mut Session, joint: usize, from: f64) {
+fn freeze_joint(session: &mut Session, joint: usize, from: f64) {
     let mut held = vec![None; session.recordings.len()];
     session.joints(|at, q| {
         if at.share >= from {
@@ -31,14 +31,14 @@ fn frozen(session: &mut Session, joint: usize, from: f64) {
     });
 }
 
-fn slips(session: &mut Session, draw: &mut Draw, joint: usize) {
+fn slip_encoder(session: &mut Session, draw: &mut Draw, joint: usize) {
     let angle = draw.signed(1.0, 4.0).to_radians();
     let moment_ns = session.moment_ns(1, draw.uniform(0.35, 0.65));
     session.joints(|at, q| q[joint] += if at.stamp_ns > moment_ns { angle } else { 0.0 });
 }
 
 /// A counter that is too short: the reading jumps back by what it holds, which is no whole turn of the joint.
-fn wraps(session: &mut Session, draw: &mut Draw, joint: usize) {
+fn wrap_encoder(session: &mut Session, draw: &mut Draw, joint: usize) {
     let [top, high, low] = quantiles(session, joint, [draw.uniform(0.45, 0.7), 0.98, 0.02]);
     let holds = (high - low) * draw.uniform(0.6, 1.1);
     session.joints(|_, q| {
@@ -48,7 +48,7 @@ fn wraps(session: &mut Session, draw: &mut Draw, joint: usize) {
     });
 }
 
-fn saturates(session: &mut Session, draw: &mut Draw, joint: usize) {
+fn saturate_encoder(session: &mut Session, draw: &mut Draw, joint: usize) {
     let [top] = quantiles(session, joint, [draw.uniform(0.5, 0.75)]);
     session.joints(|_, q| q[joint] = q[joint].min(top));
 }
@@ -61,13 +61,13 @@ fn quantiles<const N: usize>(session: &mut Session, joint: usize, shares: [f64; 
     shares.map(|share| readings[((readings.len() as f64 * share) as usize).min(readings.len() - 1)])
 }
 
-fn coarse(session: &mut Session, draw: &mut Draw) {
+fn coarsen_readings(session: &mut Session, draw: &mut Draw) {
     let step = draw.uniform(0.4, 1.0).to_radians();
-    each(session, |q| (q / step).round() * step);
+    change_readings(session, |q| (q / step).round() * step);
 }
 
 /// The driver refreshes its readings every second or so and publishes the old ones in between.
-fn stale(session: &mut Session, draw: &mut Draw) {
+fn hold_readings(session: &mut Session, draw: &mut Draw) {
     let period_ns = (1e9 * draw.uniform(0.9, 1.4)) as i64;
     let mut held: Vec<Option<(i64, Vec<f64>)>> = vec![None; session.recordings.len()];
     session.joints(|at, q| {
@@ -80,7 +80,7 @@ fn stale(session: &mut Session, draw: &mut Draw) {
 }
 
 /// A low-pass that has not settled when the rest is over.
-fn filtered(session: &mut Session, draw: &mut Draw) {
+fn filter_readings(session: &mut Session, draw: &mut Draw) {
     let time_s = draw.uniform(0.4, 0.9);
     let mut state: Vec<Option<(i64, Vec<f64>)>> = vec![None; session.recordings.len()];
     session.joints(|at, q| {
@@ -94,7 +94,7 @@ fn filtered(session: &mut Session, draw: &mut Draw) {
 }
 
 /// Errors of a quarter of a degree that are constant through a rest: no reading tells of them.
-fn noisy(session: &mut Session, draw: &mut Draw) {
+fn add_noise(session: &mut Session, draw: &mut Draw) {
     let sigma = draw.uniform(0.15, 0.4).to_radians();
     let rests: Vec<Vec<Rest>> = session.recordings.iter().map(|r| r.rests.clone()).collect();
     let joints = session.joint_names().len();
@@ -108,7 +108,7 @@ fn noisy(session: &mut Session, draw: &mut Draw) {
     });
 }
 
-fn spikes(session: &mut Session, draw: &mut Draw, joint: usize) {
+fn add_spikes(session: &mut Session, draw: &mut Draw, joint: usize) {
     let share = draw.uniform(0.01, 0.04);
     session.joints(|_, q| {
         if draw.chance(share) {
@@ -117,7 +117,7 @@ fn spikes(session: &mut Session, draw: &mut Draw, joint: usize) {
     });
 }
 
-fn resets(session: &mut Session, draw: &mut Draw) {
+fn reset_readings(session: &mut Session, draw: &mut Draw) {
     let share = draw.uniform(0.005, 0.03);
     session.joints(|_, q| {
         if draw.chance(share) {

@@ -14,38 +14,38 @@ pub const KINDS: &[Kind] = &[
     whole("recording-and-its-part", "recording-twice", ALL, part_of_it),
     whole("file-cut", "truncated-file", ALL, |s, d| {
         let share = d.uniform(0.3, 0.8);
-        damaged(s, Damage::Cut(share))
+        damage_file(s, Damage::Cut(share))
     }),
     whole("file-zeroed-in-the-middle", "damaged-file", ALL, |s, d| {
         let from = d.uniform(0.3, 0.5);
-        damaged(s, Damage::Zeros(from, from + 0.1))
+        damage_file(s, Damage::Zeros(from, from + 0.1))
     }),
-    whole("file-empty", "truncated-file", ALL, |s, _| damaged(s, Damage::Emptied)),
+    whole("file-empty", "truncated-file", ALL, |s, _| damage_file(s, Damage::Emptied)),
     whole("file-missing", "missing-file", ALL, missing_file),
-    whole("topic-misspelt", "missing-topic", ALL, |s, _| topic(s, "joints", "/joint_state")),
-    whole("tip-topic-misspelt", "missing-topic", SEEN, |s, _| topic(s, "tip", "/vicon/Tip/Tip")),
+    whole("topic-misspelt", "missing-topic", ALL, |s, _| set_topic(s, "joints", "/joint_state")),
+    whole("tip-topic-misspelt", "missing-topic", SEEN, |s, _| set_topic(s, "tip", "/vicon/Tip/Tip")),
     whole("joint-name-misspelt", "missing-joint", ALL, joint_name),
-    whole("half-of-the-messages-lost", "dropped-messages", ALL, |s, d| lost(s, d, 0.5)),
-    whole("most-messages-lost", "dropped-messages", ALL, |s, d| lost(s, d, 0.96)),
-    whole("joint-stream-with-gaps", "dropped-messages", ALL, gaps),
-    whole("messages-doubled", "duplicated-messages", ALL, doubled),
-    whole("messages-shuffled", "shuffled-order", ALL, shuffled),
-    whole("joints-at-two-hertz", "low-rate", ALL, |s, _| thinned(s, JOINTS, 500_000_000)),
+    whole("half-of-the-messages-lost", "dropped-messages", ALL, |s, d| lose_messages(s, d, 0.5)),
+    whole("most-messages-lost", "dropped-messages", ALL, |s, d| lose_messages(s, d, 0.96)),
+    whole("joint-stream-with-gaps", "dropped-messages", ALL, cut_gaps),
+    whole("messages-doubled", "duplicated-messages", ALL, double_messages),
+    whole("messages-shuffled", "shuffled-order", ALL, shuffle_messages),
+    whole("joints-at-two-hertz", "low-rate", ALL, |s, _| thin_messages(s, JOINTS, 500_000_000)),
     whole("sensor-at-one-hertz", "low-rate", SEEN, |s, _| {
         let topic = s.topic(Body::Tip);
-        thinned(s, topic, 1_000_000_000)
+        thin_messages(s, topic, 1_000_000_000)
     }),
     whole("recording-stopped-early", "too-few-dwells", ALL, stopped_early),
     whole("arm-never-at-rest", "no-dwells", ALL, never_at_rest),
     whole("sensor-frozen-from-the-middle", "stuck-sensor", SEEN, sensor_frozen),
-    whole("sensor-repeats-the-last-when-blind", "stuck-sensor", SEEN, repeats),
-    whole("sensor-zeros-when-blind", "stuck-sensor", SEEN, zeros),
+    whole("sensor-repeats-the-last-when-blind", "stuck-sensor", SEEN, repeat_when_blind),
+    whole("sensor-zeros-when-blind", "stuck-sensor", SEEN, zero_when_blind),
     whole("sensor-outliers", "outliers", SEEN, sensor_outliers),
     whole("markers-swapped-for-a-while", "marker-swapped", SEEN, markers_swapped),
     whole("sensor-filtered", "latency", SEEN, sensor_filtered),
 ];
 
-fn damaged(session: &mut Session, damage: Damage) {
+fn damage_file(session: &mut Session, damage: Damage) {
     session.damage.push((1, damage));
 }
 
@@ -62,7 +62,7 @@ fn same_file(session: &mut Session, _: &mut Draw) {
     add_entry(session, &file, "again");
 }
 
-fn copy(session: &mut Session, change: impl FnOnce(&mut Vec<Message>)) {
+fn copy_recording(session: &mut Session, change: impl FnOnce(&mut Vec<Message>)) {
     let mut twin = session.recordings[0].clone();
     "copy".clone_into(&mut twin.name);
     change(&mut twin.log.messages);
@@ -71,23 +71,23 @@ fn copy(session: &mut Session, change: impl FnOnce(&mut Vec<Message>)) {
 }
 
 fn other_name(session: &mut Session, _: &mut Draw) {
-    copy(session, |_| ());
+    copy_recording(session, |_| ());
 }
 
 /// Played back and recorded again: log times a day later, stamps as they were.
 fn encoded_again(session: &mut Session, _: &mut Draw) {
-    copy(session, |messages| messages.iter_mut().for_each(|m| m.log_ns += 86_400_000_000_000));
+    copy_recording(session, |messages| messages.iter_mut().for_each(|m| m.log_ns += 86_400_000_000_000));
 }
 
 fn part_of_it(session: &mut Session, _: &mut Draw) {
-    copy(session, |messages| messages.truncate(messages.len() * 2 / 3));
+    copy_recording(session, |messages| messages.truncate(messages.len() * 2 / 3));
 }
 
 fn missing_file(session: &mut Session, _: &mut Draw) {
     session.recordings.remove(1);
 }
 
-fn topic(session: &mut Session, stream: &str, topic: &str) {
+fn set_topic(session: &mut Session, stream: &str, topic: &str) {
     session.set(&["streams", stream, "topic"], topic);
 }
 
@@ -98,7 +98,7 @@ fn joint_name(session: &mut Session, _: &mut Draw) {
 }
 
 /// Which messages of a topic, or of all topics, are kept; `kept` is told the recording.
-fn keep(session: &mut Session, topic: Option<&str>, mut kept: impl FnMut(usize, &Message) -> bool) {
+fn keep_messages(session: &mut Session, topic: Option<&str>, mut kept: impl FnMut(usize, &Message) -> bool) {
     for (i, recorded) in session.recordings.iter_mut().enumerate() {
         let channels = &recorded.log.channels;
         let other = |m: &Message| topic.is_some_and(|topic| channels[m.channel].topic != topic);
@@ -106,23 +106,23 @@ fn keep(session: &mut Session, topic: Option<&str>, mut kept: impl FnMut(usize, 
     }
 }
 
-fn lost(session: &mut Session, draw: &mut Draw, share: f64) {
-    keep(session, None, |_, _| !draw.chance(share));
+fn lose_messages(session: &mut Session, draw: &mut Draw, share: f64) {
+    keep_messages(session, None, |_, _| !draw.chance(share));
 }
 
-fn gaps(session: &mut Session, draw: &mut Draw) {
+fn cut_gaps(session: &mut Session, draw: &mut Draw) {
     let (period_s, gap_s) = (draw.uniform(25.0, 40.0), draw.uniform(6.0, 12.0));
-    keep(session, Some(JOINTS), |_, m| (m.stamp_ns as f64 * 1e-9) % period_s > gap_s);
+    keep_messages(session, Some(JOINTS), |_, m| (m.stamp_ns as f64 * 1e-9) % period_s > gap_s);
 }
 
-fn doubled(session: &mut Session, _: &mut Draw) {
+fn double_messages(session: &mut Session, _: &mut Draw) {
     for recorded in &mut session.recordings {
         recorded.log.messages = recorded.log.messages.iter().flat_map(|m| [m.clone(), m.clone()]).collect();
     }
 }
 
 /// Written in any order by a recorder with many threads, log times in the order of writing.
-fn shuffled(session: &mut Session, draw: &mut Draw) {
+fn shuffle_messages(session: &mut Session, draw: &mut Draw) {
     for recorded in &mut session.recordings {
         let messages = &mut recorded.log.messages;
         let log: Vec<i64> = messages.iter().map(|m| m.log_ns).collect();
@@ -131,9 +131,9 @@ fn shuffled(session: &mut Session, draw: &mut Draw) {
     }
 }
 
-fn thinned(session: &mut Session, topic: &str, period_ns: i64) {
+fn thin_messages(session: &mut Session, topic: &str, period_ns: i64) {
     let mut last = vec![None; session.recordings.len()];
-    keep(session, Some(topic), |i, m| {
+    keep_messages(session, Some(topic), |i, m| {
         let slice = Some(m.stamp_ns / period_ns);
         std::mem::replace(&mut last[i], slice) != slice
     });
@@ -141,7 +141,7 @@ fn thinned(session: &mut Session, topic: &str, period_ns: i64) {
 
 fn stopped_early(session: &mut Session, _: &mut Draw) {
     let until_ns = session.recordings[0].rests.get(4).map_or(0, |r| r.end_ns);
-    keep(session, None, |i, m| i > 0 || m.stamp_ns <= until_ns);
+    keep_messages(session, None, |i, m| i > 0 || m.stamp_ns <= until_ns);
     session.recordings.truncate(1);
     session.entries().truncate(1);
 }
@@ -165,22 +165,22 @@ fn sensor_frozen(session: &mut Session, draw: &mut Draw) {
 }
 
 /// Blind in every fifth stretch of some seconds, as marked by `blind`.
-fn blind(stamp_ns: i64) -> bool {
+fn is_blind(stamp_ns: i64) -> bool {
     (stamp_ns / 3_000_000_000) % 4 == 0
 }
 
-fn repeats(session: &mut Session, _: &mut Draw) {
+fn repeat_when_blind(session: &mut Session, _: &mut Draw) {
     let mut held: Vec<Option<(Vector3<f64>, Quaternion<f64>)>> = vec![None; session.recordings.len()];
-    session.poses(Body::Tip, |at, p, q| match blind(at.stamp_ns) {
+    session.poses(Body::Tip, |at, p, q| match is_blind(at.stamp_ns) {
         true => (*p, *q) = *held[at.recording].get_or_insert((*p, *q)),
         false => held[at.recording] = Some((*p, *q)),
     });
 }
 
 /// The position is zero, the orientation the identity: not marked as unseen.
-fn zeros(session: &mut Session, _: &mut Draw) {
+fn zero_when_blind(session: &mut Session, _: &mut Draw) {
     session.poses(Body::Tip, |at, p, q| {
-        if blind(at.stamp_ns) {
+        if is_blind(at.stamp_ns) {
             (*p, *q) = (Vector3::zeros(), Quaternion::identity());
         }
     });

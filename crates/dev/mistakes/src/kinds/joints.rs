@@ -1,33 +1,33 @@
 //! Which joint is which, which way it turns, in what unit, from which zero.
 
-use super::{ALL, Kind, about, each, joint, kind, whole};
+use super::{ALL, Kind, about_joints, change_readings, joint, kind, whole};
 use crate::session::Session;
 use crate::{Draw, Error};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use toml::Value;
 
 pub const KINDS: &[Kind] = &[
-    kind("first-joint-reversed", "joint-sign", ALL, |s, _| reversed(s, &[0])),
-    kind("second-joint-reversed", "joint-sign", ALL, |s, _| reversed(s, &[1])),
-    kind("third-joint-reversed", "joint-sign", ALL, |s, _| reversed(s, &[2])),
+    kind("first-joint-reversed", "joint-sign", ALL, |s, _| reverse_joints(s, &[0])),
+    kind("second-joint-reversed", "joint-sign", ALL, |s, _| reverse_joints(s, &[1])),
+    kind("third-joint-reversed", "joint-sign", ALL, |s, _| reverse_joints(s, &[2])),
     kind("last-joint-reversed", "joint-sign", ALL, |s, _| {
         let last = s.joint_names().len() - 1;
-        reversed(s, &[last])
+        reverse_joints(s, &[last])
     }),
-    kind("shoulder-and-elbow-reversed", "joint-sign", ALL, |s, _| reversed(s, &[1, 2])),
+    kind("shoulder-and-elbow-reversed", "joint-sign", ALL, |s, _| reverse_joints(s, &[1, 2])),
     kind("all-joints-reversed", "joint-sign", ALL, |s, _| {
         let all: Vec<usize> = (0..s.joint_names().len()).collect();
-        reversed(s, &all)
+        reverse_joints(s, &all)
     }),
     joint("joint-reversed-and-shifted", "joint-sign", 1, |s, _, j| s.joints(|_, q| q[j] = FRAC_PI_2 - q[j])),
     kind("two-joint-names-swapped", "joint-order", ALL, names_swapped),
     whole("joint-names-rotated", "joint-order", ALL, |s, _| declared_names(s).rotate_left(1)),
     whole("joint-names-backwards", "joint-order", ALL, |s, _| declared_names(s).reverse()),
     kind("driver-in-another-order", "joint-order", ALL, driver_order),
-    whole("degrees-read-as-radians", "joint-unit", ALL, |s, _| each(s, f64::to_degrees)),
+    whole("degrees-read-as-radians", "joint-unit", ALL, |s, _| change_readings(s, f64::to_degrees)),
     whole("radians-read-as-degrees", "joint-unit", ALL, |s, _| s.set(&["streams", "joints", "unit"], "deg")),
     joint("one-joint-in-degrees", "joint-unit", 0, |s, _, j| s.joints(|_, q| q[j] = q[j].to_degrees())),
-    whole("milliradians", "joint-unit", ALL, |s, _| each(s, |q| q * 1e3)),
+    whole("milliradians", "joint-unit", ALL, |s, _| change_readings(s, |q| q * 1e3)),
     whole("counts-per-turn-doubled", "joint-unit", ALL, |s, _| as_counts(s, 8192, |_| 1)),
     joint("encoder-direction-declared-wrong", "joint-sign", 0, |s, _, j| {
         as_counts(s, 16384, |k| if k == j { -1 } else { 1 })
@@ -55,19 +55,19 @@ pub const KINDS: &[Kind] = &[
         in_one(s, d, 1, |q, j| q[j] += FRAC_PI_2)
     }),
     kind("forearm-angle-absolute", "joint-coupling", ALL, absolute_angle),
-    whole("speeds-in-the-place-of-angles", "wrong-field", ALL, speeds),
+    whole("speeds-in-the-place-of-angles", "wrong-field", ALL, angles_to_speeds),
 ];
 
-fn reversed(session: &mut Session, joints: &[usize]) -> Result<Vec<String>, Error> {
+fn reverse_joints(session: &mut Session, joints: &[usize]) -> Result<Vec<String>, Error> {
     session.joints(|_, q| joints.iter().for_each(|j| q[*j] = -q[*j]));
-    about(session, joints)
+    about_joints(session, joints)
 }
 
 fn names_swapped(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let first = draw.pick(session.joint_names().len() - 1);
     let names = declared_names(session);
     names.swap(first, first + 1);
-    about(session, &[first, first + 1])
+    about_joints(session, &[first, first + 1])
 }
 
 fn declared_names(session: &mut Session) -> &mut Vec<Value> {
@@ -85,12 +85,12 @@ fn declared_names(session: &mut Session) -> &mut Vec<Value> {
 /// The driver lists angles in another order than their names: elbow first, as some do.
 fn driver_order(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
     session.joints(|_, q| q.swap(0, 2));
-    about(session, &[0, 2])
+    about_joints(session, &[0, 2])
 }
 
 /// The stream in counts of 16384 a turn; the pipeline says what it says.
 fn as_counts(session: &mut Session, per_turn: i64, direction: impl Fn(usize) -> i64) {
-    each(session, |q| (q / TAU * 16384.0).round());
+    change_readings(session, |q| (q / TAU * 16384.0).round());
     let encoder = |joint| {
         let keys = [("counts_per_turn", per_turn), ("direction", direction(joint))];
         Value::Table(keys.into_iter().map(|(k, v)| (k.to_owned(), Value::Integer(v))).collect())
@@ -119,7 +119,7 @@ fn zero_off(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error
     let angle_rad = draw.signed(12.0, 35.0).to_radians();
     let joint = 1 + draw.pick(session.joint_names().len() - 1);
     session.joints(|_, q| q[joint] += angle_rad);
-    about(session, &[joint])
+    about_joints(session, &[joint])
 }
 
 fn zeros_off(session: &mut Session, draw: &mut Draw) {
@@ -154,10 +154,10 @@ fn in_one(
 /// The forearm's encoder reads against the room, not against the upper arm.
 fn absolute_angle(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
     session.joints(|_, q| q[2] += q[1]);
-    about(session, &[2])
+    about_joints(session, &[2])
 }
 
-fn speeds(session: &mut Session, _: &mut Draw) {
+fn angles_to_speeds(session: &mut Session, _: &mut Draw) {
     let mut before: Vec<Option<(i64, Vec<f64>)>> = vec![None; session.recordings.len()];
     session.joints(|at, q| {
         let now = (at.stamp_ns, q.clone());

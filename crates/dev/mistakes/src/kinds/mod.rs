@@ -47,11 +47,11 @@ impl Kind {
             Make::Joint(first, make) => {
                 let joint = first + draw.pick(session.joint_names().len() - first);
                 make(session, draw, joint);
-                about(session, &[joint])
+                about_joints(session, &[joint])
             }
             Make::Whole(make) => {
                 make(session, draw);
-                anything()
+                about_anything()
             }
         }
     }
@@ -108,7 +108,7 @@ pub fn kinds() -> Vec<Kind> {
 }
 
 /// A kind by its name.
-pub fn named(name: &str) -> Result<Kind, Error> {
+pub fn find_kind(name: &str) -> Result<Kind, Error> {
     kinds().into_iter().find(|kind| kind.name == name).ok_or_else(|| Error::Unknown {
         what: "kind",
         name: name.to_owned(),
@@ -117,17 +117,17 @@ pub fn named(name: &str) -> Result<Kind, Error> {
 }
 
 /// Changes every reading of every joint by itself.
-fn each(session: &mut Session, change: impl Fn(f64) -> f64) {
+fn change_readings(session: &mut Session, change: impl Fn(f64) -> f64) {
     session.joints(|_, q| q.iter_mut().for_each(|q| *q = change(*q)));
 }
 
 /// A report may be about anything.
-fn anything() -> Result<Vec<String>, Error> {
+fn about_anything() -> Result<Vec<String>, Error> {
     Ok(Vec::new())
 }
 
 /// A report has to name one of these joints.
-fn about(session: &Session, joints: &[usize]) -> Result<Vec<String>, Error> {
+fn about_joints(session: &Session, joints: &[usize]) -> Result<Vec<String>, Error> {
     let names = session.joint_names();
     Ok(joints.iter().filter_map(|j| names.get(*j).cloned()).collect())
 }

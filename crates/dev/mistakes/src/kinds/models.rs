@@ -14,12 +14,12 @@ pub const KINDS: &[Kind] = &[
         keep_names(s);
     }),
     whole("a-and-d-columns-swapped", "dh-rows", ALL, columns_swapped),
-    whole("lengths-in-metres", "length-unit", ALL, |s, _| lengths(s, 1e-3)),
-    whole("lengths-in-inches", "length-unit", ALL, |s, _| lengths(s, 1.0 / 25.4)),
+    whole("lengths-in-metres", "length-unit", ALL, |s, _| scale_lengths(s, 1e-3)),
+    whole("lengths-in-inches", "length-unit", ALL, |s, _| scale_lengths(s, 1.0 / 25.4)),
     whole("twists-in-radians", "angle-unit", ALL, twists_in_radians),
-    whole("one-twist-of-the-other-sign", "dh-sign", ALL, |s, d| one(s, d, "alpha_deg", |v| -v)),
-    whole("one-offset-of-the-other-sign", "dh-sign", ALL, |s, d| one(s, d, "d_mm", |v| -v)),
-    whole("one-length-of-the-other-sign", "dh-sign", ALL, |s, d| one(s, d, "a_mm", |v| -v)),
+    whole("one-twist-of-the-other-sign", "dh-sign", ALL, |s, d| change_one_entry(s, d, "alpha_deg", |v| -v)),
+    whole("one-offset-of-the-other-sign", "dh-sign", ALL, |s, d| change_one_entry(s, d, "d_mm", |v| -v)),
+    whole("one-length-of-the-other-sign", "dh-sign", ALL, |s, d| change_one_entry(s, d, "a_mm", |v| -v)),
     whole("link-length-wrong-by-a-lot", "link-length", ALL, link_length),
     whole("tool-length-wrong-by-a-lot", "tool-length", ALL, tool_length),
     whole("tool-left-out", "tool-length", BOARD, tool_left_out),
@@ -29,9 +29,9 @@ pub const KINDS: &[Kind] = &[
     whole("row-missing", "wrong-model-file", ALL, |s, _| {
         s.rows().remove(0);
     }),
-    whole("bounds-too-tight", "parameter-bound", ALL, |s, _| deviation(s, [0.1, 0.02, 0.08, 0.016])),
-    whole("priors-too-tight", "parameter-bound", ALL, |s, _| deviation(s, [5.0, 2.0, 0.02, 0.004])),
-    whole("wrong-entries-fixed", "parameter-fixed", ALL, fixed),
+    whole("bounds-too-tight", "parameter-bound", ALL, |s, _| set_deviation(s, [0.1, 0.02, 0.08, 0.016])),
+    whole("priors-too-tight", "parameter-bound", ALL, |s, _| set_deviation(s, [5.0, 2.0, 0.02, 0.004])),
+    whole("wrong-entries-fixed", "parameter-fixed", ALL, fix_entries),
     whole("target-offset-given-wrong", "frame-declared-wrong", POSES, target_given),
 ];
 
@@ -77,7 +77,7 @@ fn columns_swapped(session: &mut Session, _: &mut Draw) {
     });
 }
 
-fn lengths(session: &mut Session, factor: f64) {
+fn scale_lengths(session: &mut Session, factor: f64) {
     session.entries_of_rows(|_, key, value| {
         if key.ends_with("_mm") {
             *value *= factor;
@@ -94,7 +94,7 @@ fn twists_in_radians(session: &mut Session, _: &mut Draw) {
 }
 
 /// Changes one entry of those that are not near zero; an arm has few.
-fn one(session: &mut Session, draw: &mut Draw, wanted: &str, change: impl Fn(f64) -> f64) {
+fn change_one_entry(session: &mut Session, draw: &mut Draw, wanted: &str, change: impl Fn(f64) -> f64) {
     let mut found = Vec::new();
     session.entries_of_rows(|row, key, value| {
         if key == wanted && value.abs() > 1.0 {
@@ -111,7 +111,7 @@ fn one(session: &mut Session, draw: &mut Draw, wanted: &str, change: impl Fn(f64
 
 fn link_length(session: &mut Session, draw: &mut Draw) {
     let error = draw.signed(40.0, 120.0);
-    one(session, draw, "a_mm", |v| v + error);
+    change_one_entry(session, draw, "a_mm", |v| v + error);
 }
 
 fn tool_length(session: &mut Session, draw: &mut Draw) {
@@ -161,7 +161,7 @@ fn smaller_arm(session: &mut Session, draw: &mut Draw) {
     });
 }
 
-fn deviation(session: &mut Session, [bound_mm, bound_deg, prior_mm, prior_deg]: [f64; 4]) {
+fn set_deviation(session: &mut Session, [bound_mm, bound_deg, prior_mm, prior_deg]: [f64; 4]) {
     let keys = [
         ("bound_mm", bound_mm),
         ("bound_deg", bound_deg),
@@ -173,7 +173,7 @@ fn deviation(session: &mut Session, [bound_mm, bound_deg, prior_mm, prior_deg]: 
 }
 
 /// Only the zeros may move: lengths and twists are taken from the drawing.
-fn fixed(session: &mut Session, _: &mut Draw) {
+fn fix_entries(session: &mut Session, _: &mut Draw) {
     let entry = |name: &str| {
         let keys = [("name", Value::String(name.to_owned())), ("free", Value::Boolean(false))];
         Value::Table(keys.into_iter().map(|(k, v)| (k.to_owned(), v)).collect())

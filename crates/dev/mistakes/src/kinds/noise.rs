@@ -1,6 +1,6 @@
 //! Noise that is not what is declared.
 
-use super::{BOARD, Kind, POSES, SEEN, anything, kind, whole};
+use super::{BOARD, Kind, POSES, SEEN, about_anything, kind, whole};
 use crate::rigs::{Source, session_of};
 use crate::session::{Body, Session};
 use crate::{Draw, Error};
@@ -8,17 +8,17 @@ use toml::Value;
 
 pub const KINDS: &[Kind] = &[
     whole("board-tolerance-underdeclared", "noise-underdeclared", BOARD, |s, d| {
-        tolerances(s, d.uniform(0.02, 0.1))
+        scale_tolerances(s, d.uniform(0.02, 0.1))
     }),
     whole("board-tolerance-overdeclared", "noise-overdeclared", BOARD, |s, d| {
-        tolerances(s, d.uniform(8.0, 30.0))
+        scale_tolerances(s, d.uniform(8.0, 30.0))
     }),
-    kind("seats-worn-out", "noise-underdeclared", BOARD, worn),
-    whole("sensor-noise-underdeclared", "noise-underdeclared", SEEN, wobbles),
-    whole("sensor-noise-overdeclared", "noise-overdeclared", POSES, overdeclared),
+    kind("seats-worn-out", "noise-underdeclared", BOARD, wear_cavities),
+    whole("sensor-noise-underdeclared", "noise-underdeclared", SEEN, sway_mount),
+    whole("sensor-noise-overdeclared", "noise-overdeclared", POSES, overdeclare_noise),
 ];
 
-fn tolerances(session: &mut Session, factor: f64) {
+fn scale_tolerances(session: &mut Session, factor: f64) {
     for key in ["cavity_sigma_mm", "seat_sigma_mm"] {
         if let Some(Value::Float(sigma)) = session.board.as_mut().and_then(|b| b.get_mut(key)) {
             *sigma *= factor;
@@ -27,16 +27,16 @@ fn tolerances(session: &mut Session, factor: f64) {
 }
 
 /// Cavities that were used for years: half a millimetre off their drawing.
-fn worn(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
-    let Source::Lab(config) = &session.source else { return anything() };
+fn wear_cavities(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+    let Source::Lab(config) = &session.source else { return about_anything() };
     let mut config = config.clone();
     config.board.true_cavity_sigma_mm = Some(draw.uniform(0.4, 0.9));
     *session = session_of(session.rig, *config)?;
-    anything()
+    about_anything()
 }
 
 /// A mount that sways: an error that is constant through a rest and another in the next.
-fn wobbles(session: &mut Session, draw: &mut Draw) {
+fn sway_mount(session: &mut Session, draw: &mut Draw) {
     let size_m = draw.uniform(0.6e-3, 1.5e-3);
     let ends: Vec<Vec<i64>> = session
         .recordings
@@ -52,7 +52,7 @@ fn wobbles(session: &mut Session, draw: &mut Draw) {
     });
 }
 
-fn overdeclared(session: &mut Session, draw: &mut Draw) {
+fn overdeclare_noise(session: &mut Session, draw: &mut Draw) {
     session.set(&["observations", "sensor_sigma_mm"], draw.uniform(1.0, 3.0));
     session.set(&["observations", "sensor_sigma_deg"], draw.uniform(0.1, 0.3));
 }

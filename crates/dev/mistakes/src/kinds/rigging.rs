@@ -1,6 +1,6 @@
 //! What was moved, exchanged or said wrongly about the cell.
 
-use super::{ALL, BOARD, Kind, SEEN, TABLE, anything, kind, whole};
+use super::{ALL, BOARD, Kind, SEEN, TABLE, about_anything, kind, whole};
 use crate::rigs::{Rig, Source, session_of};
 use crate::session::{Body, Session};
 use crate::{Draw, Error, draw};
@@ -9,30 +9,33 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use toml::Value;
 
 pub const KINDS: &[Kind] = &[
-    kind("one-recording-of-another-arm", "different-arm", ALL, |s, _| second(s, Source::reseed)),
+    kind("one-recording-of-another-arm", "different-arm", ALL, |s, _| record_second_again(s, Source::reseed)),
     kind("one-recording-with-another-tool", "different-tool", ALL, another_tool),
     whole("tool-knocked-in-mid-recording", "different-tool", SEEN, tool_knocked),
-    kind("arm-bolted-down-elsewhere", "arm-rebased", ALL, rebased),
+    kind("arm-bolted-down-elsewhere", "arm-rebased", ALL, rebase_arm),
     whole("base-markers-knocked", "base-moved", TABLE, base_knocked),
     whole("table-markers-knocked-in-mid-recording", "table-bumped", TABLE, table_knocked),
     whole("camera-knocked", "camera-bumped", SEEN, camera_knocked),
     whole("camera-recalibrated-between-recordings", "camera-bumped", SEEN, camera_recalibrated),
     whole("base-frame-declared-wrong", "frame-declared-wrong", BOARD, base_declared),
     whole("base-markers-turned", "frame-declared-wrong", TABLE, base_turned),
-    kind("load-not-declared", "load-undeclared", BOARD, load),
-    whole("vertical-declared-wrong", "vertical-wrong", SEEN, vertical),
+    kind("load-not-declared", "load-undeclared", BOARD, add_load),
+    whole("vertical-declared-wrong", "vertical-wrong", SEEN, rotate_vertical),
 ];
 
 /// The second recording made on the rig with something changed.
-fn second(session: &mut Session, change: impl FnOnce(&mut Source)) -> Result<Vec<String>, Error> {
+fn record_second_again(
+    session: &mut Session,
+    change: impl FnOnce(&mut Source),
+) -> Result<Vec<String>, Error> {
     let mut other = session.recorded_with(change)?;
     session.recordings[1] = other.swap_remove(1);
-    anything()
+    about_anything()
 }
 
 fn another_tool(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let longer_m = draw.signed(0.012, 0.03);
-    second(session, |source| match source {
+    record_second_again(session, |source| match source {
         Source::Lab(config) => {
             if let Some(tool) = config.arm.rows.last_mut() {
                 tool.d_m += longer_m;
@@ -75,24 +78,24 @@ fn table_knocked(session: &mut Session, draw: &mut Draw) {
 }
 
 /// A small motion of the whole camera about a point near the arm.
-fn knock(draw: &mut Draw) -> Isometry3<f64> {
+fn draw_knock(draw: &mut Draw) -> Isometry3<f64> {
     let turn = draw.turn_deg(0.3, 1.0);
     let about = Vector3::new(1.2, -0.4, 0.8);
     let offset = draw.direction() * draw.uniform(0.003, 0.01);
     Isometry3::from_parts(Translation3::from(about + offset - turn * about), turn)
 }
 
-fn apply(motion: &Isometry3<f64>, p: &mut Vector3<f64>, q: &mut Quaternion<f64>) {
+fn apply_motion(motion: &Isometry3<f64>, p: &mut Vector3<f64>, q: &mut Quaternion<f64>) {
     *p = motion.rotation * *p + motion.translation.vector;
     *q = motion.rotation.quaternion() * *q;
 }
 
 fn camera_knocked(session: &mut Session, draw: &mut Draw) {
-    let motion = knock(draw);
+    let motion = draw_knock(draw);
     let moment_ns = session.moment_ns(1, draw.uniform(0.3, 0.7));
     session.all_poses(|at, p, q| {
         if at.stamp_ns > moment_ns {
-            apply(&motion, p, q);
+            apply_motion(&motion, p, q);
         }
     });
 }
@@ -102,16 +105,16 @@ fn camera_recalibrated(session: &mut Session, draw: &mut Draw) {
     let motion = Isometry3::from_parts(Translation3::from(draw.direction() * draw.uniform(0.1, 0.5)), turn);
     session.all_poses(|at, p, q| {
         if at.recording >= 1 {
-            apply(&motion, p, q);
+            apply_motion(&motion, p, q);
         }
     });
 }
 
 /// Between recordings, as far as a bench vice lets it.
-fn rebased(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
+fn rebase_arm(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, Error> {
     let offset = draw.direction() * draw.uniform(0.005, 0.015);
     let yaw_deg = draw.signed(0.5, 2.0);
-    second(session, |source| match source {
+    record_second_again(session, |source| match source {
         Source::Lab(config) => {
             // The board stays in the room, so it moves in the arm's frame.
             let xyz = &mut config.board.in_base.xyz_m;
@@ -157,9 +160,9 @@ fn base_turned(session: &mut Session, draw: &mut Draw) {
 }
 
 /// An arm that yields, half of its recordings with a load that nobody declared.
-fn load(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
-    let Source::Lab(config) = &session.source else { return anything() };
-    let seed = draw::mixed(config.seed, "load", session.rig.word());
+fn add_load(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
+    let Source::Lab(config) = &session.source else { return about_anything() };
+    let seed = draw::case_seed(config.seed, "load", session.rig.word());
     let scenario = Scenario { size: Size::Large, ..Scenario::new("compliance", Design::Load, seed) };
     let mut lab = scenario.plant()?.config;
     lab.recordings.truncate(4);
@@ -167,11 +170,11 @@ fn load(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
     for entry in session.entries().iter_mut().filter_map(Value::as_table_mut) {
         entry.remove("load_kg");
     }
-    anything()
+    about_anything()
 }
 
-fn vertical(session: &mut Session, draw: &mut Draw) {
+fn rotate_vertical(session: &mut Session, draw: &mut Draw) {
     let turn = draw.turn_deg(60.0, 120.0);
-    session.all_poses(|_, p, q| apply(&Isometry3::from_parts(Translation3::identity(), turn), p, q));
+    session.all_poses(|_, p, q| apply_motion(&Isometry3::from_parts(Translation3::identity(), turn), p, q));
     session.set(&["frames", "vertical"], "world");
 }

@@ -5,14 +5,14 @@ use crate::session::{JOINTS, Rest, Session};
 use armcal_lab::sensors::{Kind, Message, Payload};
 
 /// Set-points under the topic of the readings.
-pub(super) fn recorded(session: &mut Session, draw: &mut Draw) {
+pub(super) fn replace_readings(session: &mut Session, draw: &mut Draw) {
     let commanded = asked_for(session, draw);
     let mut next = commanded.into_iter();
     session.joints(|_, q| *q = next.next().unwrap_or_else(|| q.clone()));
 }
 
 /// The controller's topic beside that of the readings, and named in the pipeline.
-pub(super) fn named(session: &mut Session, draw: &mut Draw) {
+pub(super) fn add_command_topic(session: &mut Session, draw: &mut Draw) {
     let commanded = asked_for(session, draw);
     let mut next = commanded.into_iter();
     for recorded in &mut session.recordings {

@@ -49,7 +49,7 @@ impl Rig {
 
     /// A sound session, of a rig and with noise of the case's own.
     pub fn session(self, seed: u64, case: &str) -> Result<Session, Error> {
-        let seed = draw::mixed(seed, case, self.word());
+        let seed = draw::case_seed(seed, case, self.word());
         match self {
             Rig::Table | Rig::Sockets => session_of(self, small_lab(seed)?),
             Rig::Poses => six_axis::session(six_axis::Lab::new(seed)),
@@ -102,7 +102,7 @@ pub fn bodies(rig: Rig) -> &'static [Body] {
 }
 
 /// Topic of a body.
-pub fn topic(rig: Rig, body: Body) -> &'static str {
+pub fn body_topic(rig: Rig, body: Body) -> &'static str {
     match (rig, body) {
         (Rig::Poses, Body::Tip) => "/laser_tracker/t_mac/t_mac",
         (Rig::Poses, _) => "/laser_tracker/reference/reference",
@@ -113,7 +113,7 @@ pub fn topic(rig: Rig, body: Body) -> &'static str {
 }
 
 /// A shipped text as a table.
-fn parsed(what: &'static str, text: &str) -> Result<Table, Error> {
+fn parse_toml(what: &'static str, text: &str) -> Result<Table, Error> {
     text.parse().map_err(|source| Error::Toml { what, source: Box::new(source) })
 }
 

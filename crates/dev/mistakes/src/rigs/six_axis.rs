@@ -4,7 +4,7 @@
 //! the models that are fitted. The built arm's lines lie a little off the drawn ones.
 
 use super::hidden::Hidden;
-use super::{Rig, Source, joints_toml, parsed, topic};
+use super::{Rig, Source, body_topic, joints_toml, parse_toml};
 use crate::Error;
 use crate::session::{Body, JOINTS, Recorded, Rest, Session};
 use armcal_lab::hand::minimum_jerk;
@@ -114,7 +114,7 @@ impl Lab {
         let mut log = Log::new(clock);
         log.channel(JOINTS, Kind::JointState, "", &NAMES.map(str::to_owned));
         for body in [Body::Tip, Body::Still] {
-            log.channel(topic(Rig::Poses, body), Kind::PoseStamped, "tracker", &[]);
+            log.channel(body_topic(Rig::Poses, body), Kind::PoseStamped, "tracker", &[]);
         }
         for sequence in 0..(path.end_s() * RATE_HZ) as u32 {
             let time_s = f64::from(sequence) / RATE_HZ;
@@ -239,9 +239,9 @@ pub fn session(lab: Lab) -> Result<Session, Error> {
          [observations]\nsensor_sigma_mm = 0.03\nsensor_sigma_deg = 0.003\n\n[fit]\nuse_orientation = true\n\n\
          [holdout]\nkind = \"cavity-folds\"\nk = 5\n",
         joints_toml(&NAMES.map(str::to_owned)),
-        topic(Rig::Poses, Body::Tip),
+        body_topic(Rig::Poses, Body::Tip),
     );
-    let (pipeline, arm) = (parsed("pipeline", &text)?, parsed("arm", ARM)?);
+    let (pipeline, arm) = (parse_toml("pipeline", &text)?, parse_toml("arm", ARM)?);
     let source = Source::SixAxis(lab);
     Ok(Session { rig: Rig::Poses, source, recordings, pipeline, arm, board: None, damage: Vec::new() })
 }

@@ -1,6 +1,6 @@
 //! The paper's rig from the virtual lab, with Vicon or with encoders only.
 
-use super::{Rig, Source, joints_toml, parsed, topic};
+use super::{Rig, Source, body_topic, joints_toml, parse_toml};
 use crate::Error;
 use crate::session::{Body, JOINTS, Recorded, Rest, Session};
 use armcal_lab::sensors::Log;
@@ -22,16 +22,16 @@ pub fn small_lab(seed: u64) -> Result<LabConfig, Error> {
 /// What a laboratory records, and the texts with which its recordings are calibrated.
 pub fn session_of(rig: Rig, config: LabConfig) -> Result<Session, Error> {
     let recordings = record(rig, &config)?;
-    let pipeline = parsed("pipeline", &pipeline_toml(rig, &config))?;
-    let arm = parsed("arm", &Nominal::dh_toml(&config))?;
-    let board = Some(parsed("board", board::PAPER)?);
+    let pipeline = parse_toml("pipeline", &pipeline_toml(rig, &config))?;
+    let arm = parse_toml("arm", &Nominal::dh_toml(&config))?;
+    let board = Some(parse_toml("board", board::PAPER)?);
     let source = Source::Lab(Box::new(config));
     Ok(Session { rig, source, recordings, pipeline, arm, board, damage: Vec::new() })
 }
 
 /// The recordings of a laboratory.
 pub fn record(rig: Rig, config: &LabConfig) -> Result<Vec<Recorded>, Error> {
-    let (truth, logs) = armcal_lab::run(config, Path::new(""), &nothing_hidden)?;
+    let (truth, logs) = armcal_lab::simulate_in_memory(config, Path::new(""), &nothing_hidden)?;
     let recorded = truth.recordings.into_iter().zip(logs).map(|(truth, log)| Recorded {
         name: truth.name,
         log: if rig == Rig::Sockets { without_camera(log) } else { log },
@@ -62,7 +62,7 @@ fn pipeline_toml(rig: Rig, config: &LabConfig) -> String {
     text += &joints_toml(&config.joints.names);
     if rig == Rig::Table {
         for (stream, body) in [("tip", Body::Tip), ("base", Body::Base), ("table", Body::Table)] {
-            let _ = write!(text, "[streams.{stream}]\ntopic = \"{}\"\n\n", topic(rig, body));
+            let _ = write!(text, "[streams.{stream}]\ntopic = \"{}\"\n\n", body_topic(rig, body));
         }
     }
     let (board, base) = match rig {

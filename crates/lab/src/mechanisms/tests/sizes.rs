@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::config::{LabConfig, Order, PassConfig};
-use crate::{nothing_hidden, observe_from, run};
+use crate::{nothing_hidden, observe_from, simulate_in_memory};
 use std::path::Path;
 
 const LABS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../pipelines/lab");
@@ -57,7 +57,7 @@ fn lab() -> LabConfig {
 #[test]
 fn a_mechanism_of_no_size_changes_no_bit() {
     let plain = lab();
-    let (rigid, _) = run(&plain, Path::new(LABS), &nothing_hidden).unwrap();
+    let (rigid, _) = simulate_in_memory(&plain, Path::new(LABS), &nothing_hidden).unwrap();
     let quick = observe_from(&plain, Path::new(LABS)).unwrap().observations;
     let kinds = NOTHING_MUCH.iter().map(|text| toml::from_str::<MechanismConfig>(text).unwrap());
     for (text, mechanism) in NOTHING_MUCH.iter().zip(kinds) {
@@ -67,7 +67,8 @@ fn a_mechanism_of_no_size_changes_no_bit() {
     }
     // All at once through the streams.
     let mechanisms = NOTHING_MUCH.iter().map(|text| toml::from_str(text).unwrap()).collect();
-    let (hidden, _) = run(&LabConfig { mechanisms, ..plain }, Path::new(LABS), &nothing_hidden).unwrap();
+    let (hidden, _) =
+        simulate_in_memory(&LabConfig { mechanisms, ..plain }, Path::new(LABS), &nothing_hidden).unwrap();
     assert_eq!(hidden.recordings[0].dwells, rigid.recordings[0].dwells);
 }
 

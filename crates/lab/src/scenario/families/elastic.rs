@@ -3,22 +3,26 @@
 use super::*;
 
 pub fn compliance(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    let spring =
-        Compliance { joint: draw.joint, stiffness_nm_rad: spring(draw, config), hardening_nm_rad3: 0.0 };
+    let spring = Compliance {
+        joint: draw.joint,
+        stiffness_nm_rad: joint_stiffness_nm_rad(draw, config),
+        hardening_nm_rad3: 0.0,
+    };
     let enters = [draw.joint_channel(), format!("torque{}", draw.joint)];
-    let made = made(MechanismConfig::Compliance(spring), draw.at_joint("compliance"), enters);
+    let made = known_effect(MechanismConfig::Compliance(spring), draw.at_joint("compliance"), enters);
     let same: &[String] = if draw.joint == 3 { &["link_bending:3".to_owned()] } else { &[] };
     Ok(made.same(same).alike(&gravity_relatives(draw.joint)))
 }
 
 pub fn hardening_compliance(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
-    let linear = spring(draw, config);
+    let linear = joint_stiffness_nm_rad(draw, config);
     // A third softer than the linear spring of this size at first, a third of the torque from the cubic at the end.
     let stiffness_nm_rad = linear * 2.0 / 3.0;
     let hardening_nm_rad3 = linear / 3.0 / draw.size.to_radians().powi(2);
     let spring = Compliance { joint: draw.joint, stiffness_nm_rad, hardening_nm_rad3 };
     let enters = [draw.joint_channel(), format!("torque{}", draw.joint)];
-    let made = made(MechanismConfig::Compliance(spring), draw.at_joint("hardening_compliance"), enters);
+    let made =
+        known_effect(MechanismConfig::Compliance(spring), draw.at_joint("hardening_compliance"), enters);
     Ok(made.alike(&gravity_relatives(draw.joint)))
 }
 
@@ -28,7 +32,8 @@ pub fn belt_compliance(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, 
     let joint = draw.joint - 1;
     let springs = BeltCompliance { joint, stiffness_nm_rad, belt_stiffness_nm_rad: None };
     let enters = [format!("joint{joint} with the forearm's direction kept"), format!("torque{joint}")];
-    let made = made(MechanismConfig::BeltCompliance(springs), draw.at_joint("belt_compliance"), enters);
+    let made =
+        known_effect(MechanismConfig::BeltCompliance(springs), draw.at_joint("belt_compliance"), enters);
     Ok(made.alike(&gravity_relatives(joint)))
 }
 
@@ -43,18 +48,18 @@ pub fn link_bending(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, Lab
     let work = force_n * length_m.powi(3) / 3.0 + moment_nm * length_m * length_m / 2.0;
     let beam = LinkBending { link: draw.joint, stiffness_nm2: work / (draw.size * 1e-3) };
     let enters = [draw.joint_channel(), format!("torque{}", draw.joint)];
-    let made = made(MechanismConfig::LinkBending(beam), draw.at_joint("link_bending"), enters);
+    let made = known_effect(MechanismConfig::LinkBending(beam), draw.at_joint("link_bending"), enters);
     Ok(made.alike(&gravity_relatives(draw.joint)))
 }
 
 pub fn base_compliance(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError> {
     let plate = BaseCompliance { stiffness_nm_rad: stretched_nm(config)[1] / draw.size.to_radians() };
     let enters = ["base".to_owned(), "torque2".to_owned()];
-    let made = made(MechanismConfig::BaseCompliance(plate), "base_compliance".into(), enters);
+    let made = known_effect(MechanismConfig::BaseCompliance(plate), "base_compliance".into(), enters);
     Ok(made.alike(&gravity_relatives(2)))
 }
 
-fn spring(draw: &Draw, config: &LabConfig) -> f64 {
+fn joint_stiffness_nm_rad(draw: &Draw, config: &LabConfig) -> f64 {
     stretched_nm(config)[draw.joint - 1] / draw.size.to_radians()
 }
 

@@ -16,21 +16,21 @@ pub fn backlash(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabErr
         };
         MechanismConfig::FrictionWindup(wound)
     } else {
-        MechanismConfig::Gap(gap(draw.joint, draw.size))
+        MechanismConfig::Gap(uniform_gap(draw.joint, draw.size))
     };
-    Ok(made(mechanism, draw.at_joint("backlash"), arrival(draw, draw.joint)))
+    Ok(known_effect(mechanism, draw.at_joint("backlash"), driven_by_arrival(draw, draw.joint)))
 }
 
 pub fn gravity_backlash(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
-    let gap = Gap { friction_nm: Some(0.05), ..gap(draw.joint, draw.size) };
+    let gap = Gap { friction_nm: Some(0.05), ..uniform_gap(draw.joint, draw.size) };
     let enters = [draw.joint_channel(), format!("torque{}", draw.joint)];
-    Ok(made(MechanismConfig::Gap(gap), draw.at_joint("gravity_backlash"), enters))
+    Ok(known_effect(MechanismConfig::Gap(gap), draw.at_joint("gravity_backlash"), enters))
 }
 
 pub fn belt_backlash(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
-    let gap = Gap { belt_over: Some(draw.joint - 1), ..gap(draw.joint, draw.size) };
+    let gap = Gap { belt_over: Some(draw.joint - 1), ..uniform_gap(draw.joint, draw.size) };
     let enters = [draw.joint_channel(), "dir23".to_owned()];
-    let made = made(MechanismConfig::Gap(gap), draw.at_joint("belt_backlash"), enters);
+    let made = known_effect(MechanismConfig::Gap(gap), draw.at_joint("belt_backlash"), enters);
     Ok(made.alike_unless(draw.design.is_wide(), &[draw.at_joint("backlash")]))
 }
 
@@ -40,7 +40,7 @@ pub fn crossed_backlash(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made
     let by = draw.joint + 1;
     let rub = CrossedFriction { joint: draw.joint, by, friction_nm, stiffness_nm_rad, ..Default::default() };
     let effect = format!("crossed_backlash:{},from={by}", draw.joint);
-    let made = made(MechanismConfig::CrossedFriction(rub), effect, arrival(draw, by));
+    let made = known_effect(MechanismConfig::CrossedFriction(rub), effect, driven_by_arrival(draw, by));
     // On one path the two joints may always turn against each other.
     let few = matches!(draw.design, Design::OneTiltOnePass | Design::OneTiltBothWays | Design::Plunge);
     Ok(made.alike_unless(!few, &[format!("backlash:{by}"), draw.at_joint("backlash")]))
@@ -56,18 +56,18 @@ pub fn friction_windup(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, 
         balanced: true,
         ..Default::default()
     };
-    let made = made(
+    let made = known_effect(
         MechanismConfig::FrictionWindup(wound),
         draw.at_joint("friction_windup"),
-        arrival(draw, draw.joint),
+        driven_by_arrival(draw, draw.joint),
     );
     Ok(made.alike_unless(draw.design.is_wide(), &[draw.at_joint("backlash")]))
 }
 
-fn arrival(draw: &Draw, joint: usize) -> [String; 2] {
+fn driven_by_arrival(draw: &Draw, joint: usize) -> [String; 2] {
     [draw.joint_channel(), format!("dir{joint}")]
 }
 
-fn gap(joint: usize, width_deg: f64) -> Gap {
+fn uniform_gap(joint: usize, width_deg: f64) -> Gap {
     Gap { joint, width_deg, worn_span_deg: 10.0, ..Gap::default() }
 }

@@ -4,7 +4,7 @@ use super::*;
 use armcal_core::Pose;
 use nalgebra::Point3;
 
-pub fn slip(draw: &mut Draw, config: &LabConfig, timing: Timing) -> Result<Made, LabError> {
+pub fn zero_slip(draw: &mut Draw, config: &LabConfig, timing: Timing) -> Result<Made, LabError> {
     let slip_deg = draw.signed();
     let Event { recording, at_s, until_s, when } = draw.event(config, timing)?;
     let slip = ZeroSlip { joint: draw.joint, slip_deg, recording, at_s, until_s };
@@ -15,10 +15,15 @@ pub fn slip(draw: &mut Draw, config: &LabConfig, timing: Timing) -> Result<Made,
     };
     let effect = draw.at_joint("zero_slip") + &when;
     let enters = [draw.joint_channel(), "recording".to_owned()];
-    Ok(made(MechanismConfig::ZeroSlip(slip), effect, enters).same(&same))
+    Ok(known_effect(MechanismConfig::ZeroSlip(slip), effect, enters).same(&same))
 }
 
-pub fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timing) -> Result<Made, LabError> {
+pub fn body_shift(
+    draw: &mut Draw,
+    config: &LabConfig,
+    body: BumpedBody,
+    timing: Timing,
+) -> Result<Made, LabError> {
     let shift_mm: [f64; 3] = (draw.direction() * draw.size).into();
     let turn_deg =
         if body == BumpedBody::Base { draw.direction() * (0.1 * draw.size) } else { Vector3::zeros() };
@@ -31,7 +36,7 @@ pub fn bump(draw: &mut Draw, config: &LabConfig, body: BumpedBody, timing: Timin
         _ => ("frame_shift", "world", vec![format!("zero_slip:1{when}"), format!("tool_shift{when}")]),
     };
     let enters = [channel.to_owned(), "recording".to_owned()];
-    Ok(made(MechanismConfig::Bump(knock), format!("{effect}{when}"), enters).alike(&alike))
+    Ok(known_effect(MechanismConfig::Bump(knock), format!("{effect}{when}"), enters).alike(&alike))
 }
 
 /// Read at the end of its rest, a joint has this share of its last move before it: only where motors drive the arm to
@@ -42,7 +47,7 @@ pub fn unsettled_reading(draw: &mut Draw, config: &mut LabConfig) -> Result<Made
     config.task.free.hold_s = [longest_s; 2];
     let lag = Lag { joint: draw.joint, time_constant_s: longest_s / -draw.size.ln(), before: None };
     let enters = [draw.joint_channel(), format!("s{}", draw.joint)];
-    let made = made(MechanismConfig::Lag(lag), draw.at_joint("unsettled_reading"), enters);
+    let made = known_effect(MechanismConfig::Lag(lag), draw.at_joint("unsettled_reading"), enters);
     Ok(made
         .alike_unless(draw.design.is_wide(), &[draw.at_joint("backlash"), draw.at_joint("friction_windup")]))
 }
@@ -66,7 +71,7 @@ pub fn zero_drift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabEr
     let deg_per_hour = draw.signed() * 3600.0 / session_s(config)?;
     let drift = ZeroDrift { joint: draw.joint, deg_per_hour };
     let enters = [draw.joint_channel(), "time".to_owned()];
-    let made = made(MechanismConfig::ZeroDrift(drift), draw.at_joint("zero_drift"), enters);
+    let made = known_effect(MechanismConfig::ZeroDrift(drift), draw.at_joint("zero_drift"), enters);
     Ok(made.alike_unless(draw.design.is_wide(), &slow_relatives()))
 }
 
@@ -74,7 +79,7 @@ pub fn frame_drift(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabE
     let way = draw.direction() * (draw.size * 3600.0 / session_s(config)?);
     let drift = FrameDrift { body: DriftingBody::Base, mm_per_hour: way.into() };
     let enters = ["world".to_owned(), "time".to_owned()];
-    let made = made(MechanismConfig::FrameDrift(drift), "frame_drift".into(), enters);
+    let made = known_effect(MechanismConfig::FrameDrift(drift), "frame_drift".into(), enters);
     Ok(made.alike_unless(draw.design.is_wide(), &slow_relatives()))
 }
 
@@ -86,7 +91,7 @@ pub fn thermal_growth(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, L
     config.temperature.rise_k = draw.size * 1e4 / PLASTIC_PPM;
     let growth = ThermalGrowth { links: vec![1, 2, 3], per_kelvin_ppm: PLASTIC_PPM, ..Default::default() };
     let enters = ["length".to_owned(), "temperature".to_owned()];
-    let made = made(MechanismConfig::ThermalGrowth(growth), "thermal_growth".into(), enters);
+    let made = known_effect(MechanismConfig::ThermalGrowth(growth), "thermal_growth".into(), enters);
     Ok(made.alike_unless(draw.design.is_wide(), &slow_relatives()))
 }
 
@@ -101,7 +106,7 @@ pub fn warm_up(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, LabError
         ..Default::default()
     };
     let enters = ["length".to_owned(), "time".to_owned()];
-    let made = made(MechanismConfig::WarmUp(warming), "warm_up".into(), enters);
+    let made = known_effect(MechanismConfig::WarmUp(warming), "warm_up".into(), enters);
     Ok(made.alike(&["thermal_growth".to_owned()]).alike_unless(draw.design.is_wide(), &slow_relatives()))
 }
 
@@ -115,7 +120,7 @@ pub fn sensor_scale(draw: &mut Draw, config: &mut LabConfig) -> Result<Made, Lab
     let percent: [f64; 3] = (axes * (draw.size / axes.amax())).into();
     let wand = CameraScale { percent, centre_m: middle_m(config) };
     let enters = ["world".to_owned(), "position".to_owned()];
-    let made = made(MechanismConfig::CameraScale(wand), "sensor_scale".into(), enters);
+    let made = known_effect(MechanismConfig::CameraScale(wand), "sensor_scale".into(), enters);
     Ok(made.alike(&["volume_distortion".to_owned(), "board_scale".to_owned()]))
 }
 
@@ -124,13 +129,14 @@ pub fn volume_distortion(draw: &mut Draw, config: &mut LabConfig) -> Result<Made
     let mm_at_1m = draw.signed() / 0.5f64.powi(3);
     let lens = CameraDistortion { mm_at_1m, centre_m: middle_m(config) };
     let enters = ["world".to_owned(), "position".to_owned()];
-    let made = made(MechanismConfig::CameraDistortion(lens), "volume_distortion".into(), enters);
+    let made = known_effect(MechanismConfig::CameraDistortion(lens), "volume_distortion".into(), enters);
     Ok(made.alike(&["sensor_scale".to_owned()]))
 }
 
 pub fn board_scale(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
     let percent = [draw.signed(); 3];
     let enters = ["board".to_owned(), "position".to_owned()];
-    let made = made(MechanismConfig::BoardScale(BoardScale { percent }), "board_scale".into(), enters);
+    let made =
+        known_effect(MechanismConfig::BoardScale(BoardScale { percent }), "board_scale".into(), enters);
     Ok(made.alike(&["sensor_scale".to_owned()]))
 }

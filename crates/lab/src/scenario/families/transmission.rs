@@ -5,7 +5,7 @@ use super::*;
 pub fn axis_tilt(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
     let tilt = AxisTilt { joint: draw.joint, tilt_deg: draw.signed() };
     let enters = ["axis".to_owned(), "q".to_owned()];
-    let made = made(MechanismConfig::AxisTilt(tilt), draw.at_joint("axis_tilt"), enters);
+    let made = known_effect(MechanismConfig::AxisTilt(tilt), draw.at_joint("axis_tilt"), enters);
     Ok(made.alike_unless(draw.design.is_wide(), &shape_relatives(draw.joint - 1)))
 }
 
@@ -18,13 +18,21 @@ pub fn eccentricity(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, La
         phase_deg: draw.phase_deg(),
         on: if draw.draw.chance(0.5) { MountedOn::Gear } else { MountedOn::Encoder },
     };
-    let made = made(MechanismConfig::Eccentricity(wheel), draw.at_joint("eccentricity"), angle(draw));
+    let made = known_effect(
+        MechanismConfig::Eccentricity(wheel),
+        draw.at_joint("eccentricity"),
+        driven_by_angle(draw),
+    );
     Ok(made.alike_unless(draw.design.is_wide(), &shape_relatives(draw.joint)))
 }
 
 pub fn second_harmonic(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
     let ring = SecondHarmonic { joint: draw.joint, amplitude_deg: draw.size, phase_deg: draw.phase_deg() };
-    let made = made(MechanismConfig::SecondHarmonic(ring), draw.at_joint("second_harmonic"), angle(draw));
+    let made = known_effect(
+        MechanismConfig::SecondHarmonic(ring),
+        draw.at_joint("second_harmonic"),
+        driven_by_angle(draw),
+    );
     Ok(made.alike_unless(draw.design.is_wide(), &shape_relatives(draw.joint)))
 }
 
@@ -33,12 +41,13 @@ pub fn periodic(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabErr
     let pinion =
         ToothRunout { joint: draw.joint, amplitude_deg: draw.size, per_turn, phase_deg: draw.phase_deg() };
     let effect = format!("{},frequency={per_turn}", draw.at_joint("periodic"));
-    Ok(made(MechanismConfig::ToothRunout(pinion), effect, angle(draw)))
+    Ok(known_effect(MechanismConfig::ToothRunout(pinion), effect, driven_by_angle(draw)))
 }
 
 pub fn gear_ratio(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, LabError> {
     let gear = GearRatio { joint: draw.joint, error_percent: draw.signed() };
-    let made = made(MechanismConfig::GearRatio(gear), draw.at_joint("gear_ratio"), angle(draw));
+    let made =
+        known_effect(MechanismConfig::GearRatio(gear), draw.at_joint("gear_ratio"), driven_by_angle(draw));
     Ok(made.alike_unless(draw.design.is_wide(), &shape_relatives(draw.joint)))
 }
 
@@ -46,6 +55,6 @@ pub fn belt_coupling(draw: &mut Draw, _config: &mut LabConfig) -> Result<Made, L
     let by = draw.joint - 1;
     let belt = BeltCoupling { joint: draw.joint, by, share_percent: draw.signed() };
     let enters = [draw.joint_channel(), format!("q{by}")];
-    let made = made(MechanismConfig::BeltCoupling(belt), draw.at_joint("belt_coupling"), enters);
+    let made = known_effect(MechanismConfig::BeltCoupling(belt), draw.at_joint("belt_coupling"), enters);
     Ok(made.alike_unless(draw.design.is_wide(), &shape_relatives(by)))
 }
