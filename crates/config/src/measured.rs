@@ -2,7 +2,7 @@
 
 use crate::{ClosedChainSection, ClosureKind, FrameSection, Measure, MeasureKind, MeasureSection, Pipeline};
 use armcal_core::{Against, FeatureId, Pose};
-use armcal_model::{FixedPlace, Frame, Length};
+use armcal_model::{DISTANCE, FixedPlace, Frame, Length};
 
 impl Pipeline {
     /// The points, then the planes that stand in the world.
@@ -17,38 +17,40 @@ impl Pipeline {
 
     /// The lengths that distances count from, in the order of the measurements.
     pub fn lengths(&self) -> Vec<Length> {
-        let distances = self.measure.iter().filter(|m| m.kind == MeasureKind::Distance);
+        let counted = self.measure.iter().filter(|m| m.kind.has_length());
         let link = self.closed_chain.iter().filter_map(ClosedChainSection::link);
-        link.chain(distances.map(MeasureSection::length)).collect()
+        link.chain(counted.map(MeasureSection::length)).collect()
     }
 
     /// What is measured between places: each `[[measure]]`, and the joined tips of two arms.
     pub fn measures(&self) -> Vec<Measure> {
+        // One number after the other, in the order of `lengths`.
+        let mut lengths = 0..;
+        let mut next = |counts: bool| if counts { lengths.next() } else { None };
         let joined = self.closed_chain.iter().map(|closure| {
             let [feature, to] = self.joins(closure);
             Measure {
                 name: "the other tip".into(),
                 kind: match closure.kind {
                     ClosureKind::SamePoint => MeasureKind::Coincide,
-                    ClosureKind::RigidLink => MeasureKind::Distance,
+                    ClosureKind::RigidLink => MeasureKind::Number(&DISTANCE),
                 },
                 feature,
                 against: Against::Feature(to),
-                length: 0,
+                length: next(closure.link().is_some()),
                 sigma_m: closure.sigma_mm * 1e-3,
                 reading_m: None,
                 recordings: None,
                 max_gap_m: closure.max_gap_mm * 1e-3,
             }
         });
-        let mut lengths = usize::from(self.closed_chain.iter().any(|closure| closure.link().is_some()))..;
-        let mut next = |kind| if kind == MeasureKind::Distance { lengths.next().unwrap_or(0) } else { 0 };
+        let joined: Vec<Measure> = joined.collect();
         let of_section = self.measure.iter().map(|section| Measure {
             name: section.name().to_owned(),
             kind: section.kind,
             feature: self.feature(&section.between[0]).unwrap_or_default(),
             against: Against::Fixed(self.place(&section.between[1]).unwrap_or(0)),
-            length: next(section.kind),
+            length: next(section.kind.has_length()),
             sigma_m: section.sigma_mm * 1e-3,
             reading_m: section.reading.as_ref().map(|_| {
                 section.range_mm.map_or([f64::NEG_INFINITY, f64::INFINITY], |range| range.map(|mm| mm * 1e-3))
@@ -59,7 +61,7 @@ impl Pipeline {
             }),
             max_gap_m: section.max_gap_mm * 1e-3,
         });
-        joined.chain(of_section).collect()
+        joined.into_iter().chain(of_section).collect()
     }
 
     /// The joined features of the model: of two arms their tips.

@@ -2,9 +2,9 @@
 
 use crate::FramePose;
 use armcal_core::{Against, FeatureId};
-use armcal_model::{Knowledge, Length};
+use armcal_model::{Knowledge, Length, MeasurementKind, find_measurement, measurement_kinds};
 use armcal_recording::GaugeStream;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 /// One measurement, as written.
 #[derive(Debug, Clone, Deserialize)]
@@ -12,11 +12,11 @@ use serde::Deserialize;
 pub struct MeasureSection {
     /// Its name, of which parameters, errors and warnings speak; that of the place when absent.
     pub name: Option<String>,
-    /// `"coincide"`, `"distance"` or `"plane"`.
+    /// `"coincide"`, `"distance"`, `"plane"`, or what was registered beside them.
     pub kind: MeasureKind,
     /// `"tip"` or a marker, then a point (for `"plane"`: a plane).
     pub between: [String; 2],
-    /// Of a distance [mm]: what it is, or what it is where the instrument reads zero; default 0 with a `reading`.
+    /// Of a kind that counts from a length, as a distance [mm]: what it is, or what it is where the instrument reads zero; default 0 with a `reading`.
     pub length_mm: Option<f64>,
     /// How well that is known: `"given"` (default), `"measured"` with `length_sigma_mm`, `"estimated"`.
     #[serde(default)]
@@ -38,15 +38,49 @@ pub struct MeasureSection {
 }
 
 /// What is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum MeasureKind {
     /// Both in one point: 3 rows.
     Coincide,
-    /// How far they are from each other: 1 row.
-    Distance,
-    /// How high it is above the plane: 1 row.
-    Plane,
+    /// A number between them: 1 row.
+    Number(&'static MeasurementKind),
+}
+
+/// In files, both in one point.
+const COINCIDE: &str = "coincide";
+
+impl MeasureKind {
+    /// Whether it counts from a length.
+    pub fn has_length(self) -> bool {
+        matches!(self, MeasureKind::Number(kind) if kind.has_length)
+    }
+
+    /// The section that its places are declared in.
+    pub(crate) fn places(self) -> &'static str {
+        match self {
+            MeasureKind::Number(kind) if kind.is_against_plane => "planes",
+            _ => "points",
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for MeasureKind {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<MeasureKind, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        if name == COINCIDE {
+            return Ok(MeasureKind::Coincide);
+        }
+        find_measurement(&name).map(MeasureKind::Number).ok_or_else(|| {
+            let known: Vec<String> = std::iter::once(COINCIDE)
+                .chain(measurement_kinds().iter().map(|kind| kind.name))
+                .map(|known| format!("`{known}`"))
+                .collect();
+            serde::de::Error::custom(format!(
+                "unknown variant `{name}`, expected one of {}",
+                known.join(", ")
+            ))
+        })
+    }
 }
 
 fn default_max_gap_mm() -> f64 {
@@ -64,8 +98,8 @@ pub struct Measure {
     pub feature: FeatureId,
     /// Against what.
     pub against: Against,
-    /// Of a distance: which of the model's lengths it counts from.
-    pub length: usize,
+    /// Which of the model's lengths it counts from, where its kind does.
+    pub length: Option<usize>,
     /// Standard error per row [m].
     pub sigma_m: f64,
     /// Whether an instrument says how far, and between which readings [m].

@@ -3,11 +3,12 @@
 
 use crate::{FeatureId, Observation};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// How the true position of the tip is known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase")]
+#[serde(from = "StoredReference", into = "StoredReference")]
 pub enum Reference {
     /// The tip is seated in a cavity of the board; the board's pose is a frame of the model.
     Seated {
@@ -23,7 +24,6 @@ pub enum Reference {
         /// Orientation of the tracked body, where it is used.
         orientation: Option<UnitQuaternion<f64>>,
         /// Standard error of the orientation per axis [rad]; infinite, in JSON `null`, where there is none.
-        #[serde(serialize_with = "finite", deserialize_with = "finite_or_infinity")]
         orientation_sigma_rad: f64,
     },
     /// It is in one point with another place of the model.
@@ -31,20 +31,15 @@ pub enum Reference {
         /// The other place.
         to: Against,
     },
-    /// Its distance from another place was measured: `p[length] + reading`, as of a rigid link, or of a ballbar.
-    Apart {
+    /// One number was measured between it and another place: how far it is from it, how high above it.
+    Number {
+        /// What: the name of a kind of measurement.
+        kind: Cow<'static, str>,
         /// The other place.
-        from: Against,
-        /// Which of the model's lengths, by its place among them.
-        length: usize,
+        to: Against,
+        /// Which of the model's lengths it counts from, by its place among them.
+        length: Option<usize>,
         /// What an instrument shows beyond that length [m]; zero without one.
-        reading_m: f64,
-    },
-    /// Its height above a plane was measured, along the plane's z axis: zero where it touches, else what a gauge shows.
-    Above {
-        /// Which of the model's fixed places.
-        plane: usize,
-        /// The height [m].
         reading_m: f64,
     },
 }
@@ -63,6 +58,16 @@ impl Reference {
     /// A position the sensor saw [m], its frame; no orientation.
     pub fn position(position_m: Vector3<f64>) -> Reference {
         Reference::Tracked { position_m, orientation: None, orientation_sigma_rad: 0.0 }
+    }
+
+    /// A distance from another place, `p[length] + reading`: of a rigid link, or of a ballbar.
+    pub fn distance(to: Against, length: usize, reading_m: f64) -> Reference {
+        Reference::Number { kind: DISTANCE.into(), to, length: Some(length), reading_m }
+    }
+
+    /// A height above a plane, along the plane's z axis: zero where it touches, else what a gauge shows.
+    pub fn height(plane: usize, reading_m: f64) -> Reference {
+        Reference::Number { kind: PLANE.into(), to: Against::Fixed(plane), length: None, reading_m }
     }
 }
 
@@ -105,24 +110,22 @@ impl Observation {
     /// The place of the model that it was measured against; none of what a sensor saw, or of a cavity.
     pub fn against(&self) -> Option<Against> {
         match self.reference {
-            Reference::Joined { to } => Some(to),
-            Reference::Apart { from, .. } => Some(from),
-            Reference::Above { plane, .. } => Some(Against::Fixed(plane)),
+            Reference::Joined { to } | Reference::Number { to, .. } => Some(to),
             Reference::Seated { .. } | Reference::Tracked { .. } => None,
         }
     }
 
-    /// Which of the model's lengths a distance counts from.
+    /// Which of the model's lengths a number counts from.
     pub fn length(&self) -> Option<usize> {
         match self.reference {
-            Reference::Apart { length, .. } => Some(length),
+            Reference::Number { length, .. } => length,
             _ => None,
         }
     }
 
     /// Whether one number was measured, a distance or a height, and not a position.
     pub fn is_scalar(&self) -> bool {
-        matches!(self.reference, Reference::Apart { .. } | Reference::Above { .. })
+        matches!(self.reference, Reference::Number { .. })
     }
 
     /// What was measured, in words, and its coordinates or the one number [m]; none of what is only joined.
@@ -130,19 +133,85 @@ impl Observation {
         match &self.reference {
             Reference::Seated { in_board_m, .. } => ("the position of the cavity", in_board_m.as_slice()),
             Reference::Tracked { position_m, .. } => ("the measured position", position_m.as_slice()),
-            Reference::Apart { reading_m, .. } | Reference::Above { reading_m, .. } => {
-                ("the reading", std::slice::from_ref(reading_m))
-            }
+            Reference::Number { reading_m, .. } => ("the reading", std::slice::from_ref(reading_m)),
             Reference::Joined { .. } => ("nothing", &[]),
         }
     }
 }
 
-/// A number, or nothing for infinity, which JSON does not have.
-fn finite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    value.is_finite().then_some(*value).serialize(serializer)
+/// Kinds of measurement that have a form of their own in files.
+pub const DISTANCE: &str = "distance";
+/// See [`DISTANCE`].
+pub const PLANE: &str = "plane";
+
+/// A reference in files. Distances and heights are written as version 0.1 did.
+#[derive(Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum StoredReference {
+    Seated {
+        cavity: String,
+        in_board_m: Vector3<f64>,
+    },
+    Tracked {
+        position_m: Vector3<f64>,
+        orientation: Option<UnitQuaternion<f64>>,
+        /// JSON has no infinity.
+        orientation_sigma_rad: Option<f64>,
+    },
+    Joined {
+        to: Against,
+    },
+    Apart {
+        from: Against,
+        length: usize,
+        reading_m: f64,
+    },
+    Above {
+        plane: usize,
+        reading_m: f64,
+    },
+    Number {
+        measurement: String,
+        to: Against,
+        length: Option<usize>,
+        reading_m: f64,
+    },
 }
 
-fn finite_or_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
+impl From<Reference> for StoredReference {
+    fn from(reference: Reference) -> StoredReference {
+        match reference {
+            Reference::Seated { cavity, in_board_m } => StoredReference::Seated { cavity, in_board_m },
+            Reference::Tracked { position_m, orientation, orientation_sigma_rad: sigma_rad } => {
+                let orientation_sigma_rad = sigma_rad.is_finite().then_some(sigma_rad);
+                StoredReference::Tracked { position_m, orientation, orientation_sigma_rad }
+            }
+            Reference::Joined { to } => StoredReference::Joined { to },
+            Reference::Number { kind, to, length, reading_m } => match (&*kind, to, length) {
+                (DISTANCE, from, Some(length)) => StoredReference::Apart { from, length, reading_m },
+                (PLANE, Against::Fixed(plane), None) => StoredReference::Above { plane, reading_m },
+                _ => StoredReference::Number { measurement: kind.into_owned(), to, length, reading_m },
+            },
+        }
+    }
+}
+
+impl From<StoredReference> for Reference {
+    fn from(stored: StoredReference) -> Reference {
+        match stored {
+            StoredReference::Seated { cavity, in_board_m } => Reference::Seated { cavity, in_board_m },
+            StoredReference::Tracked { position_m, orientation, orientation_sigma_rad } => {
+                let orientation_sigma_rad = orientation_sigma_rad.unwrap_or(f64::INFINITY);
+                Reference::Tracked { position_m, orientation, orientation_sigma_rad }
+            }
+            StoredReference::Joined { to } => Reference::Joined { to },
+            StoredReference::Apart { from, length, reading_m } => {
+                Reference::distance(from, length, reading_m)
+            }
+            StoredReference::Above { plane, reading_m } => Reference::height(plane, reading_m),
+            StoredReference::Number { measurement, to, length, reading_m } => {
+                Reference::Number { kind: measurement.into(), to, length, reading_m }
+            }
+        }
+    }
 }

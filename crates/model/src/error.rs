@@ -37,6 +37,14 @@ pub enum ModelError {
         index: usize,
         known: usize,
     },
+    /// A measurement of a kind that this program does not have.
+    #[error(
+        "{dwell} was measured as \"{kind}\", which is no kind of measurement of this program: register it, or update armcal"
+    )]
+    UnknownMeasurement { dwell: armcal_core::DwellId, kind: String },
+    /// A kind of effect or measurement that cannot be added.
+    #[error("registering \"{name}\": {problem}")]
+    NotRegistered { name: String, problem: &'static str },
     /// Nothing moves.
     #[error("{}: the chain has no moving joint; give at least one row joint = \"revolute\" or \"prismatic\"", path.display())]
     NoJoint { path: PathBuf },

@@ -25,7 +25,9 @@ mod error;
 mod fixed;
 mod frames;
 mod masses;
+mod measurements;
 mod model;
+mod registry;
 mod residual;
 mod rigid;
 mod segment;
@@ -51,8 +53,13 @@ pub use error::ModelError;
 pub use fixed::{FixedPlace, Length};
 pub use frames::{Frame, Frames, Knowledge, Marker};
 pub use masses::Masses;
+pub use measurements::{
+    AnyMeasurement, DISTANCE, Measurement, MeasurementKind, find_measurement, measurement_kinds,
+    register_measurements,
+};
 pub use model::{CarriedMotions, CarriedPoint, LinkFrame, Model, RecordingStart};
 pub use residual::ModelResidual;
+pub use rigid::Scalar;
 pub use segment::Motion;
 pub use skeleton::{Bone, Moving, Place, Skeleton};
 pub use tree::Asked;

@@ -12,11 +12,12 @@ use crate::arms::{self, ArmFrames};
 use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
 use crate::error::most_similar;
 use crate::fixed::{FixedPlace, Length, Standing};
+use crate::measurements::find_measurement;
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
 use crate::tree::{SegmentId, Tree};
 use crate::{Chain, Frame, Frames, Marker, Masses, ModelError};
-use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Unit};
+use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Unit};
 pub use carried::{CarriedMotions, CarriedPoint};
 use features::Feature;
 pub use features::LinkFrame;
@@ -241,6 +242,11 @@ impl Model {
     /// That there is what an observation was measured against.
     fn check_against(&self, o: &Observation) -> Result<(), ModelError> {
         let unknown = |what, index, known| Err(ModelError::NoPlace { dwell: o.dwell, what, index, known });
+        if let Reference::Number { kind, .. } = &o.reference
+            && find_measurement(kind).is_none()
+        {
+            return Err(ModelError::UnknownMeasurement { dwell: o.dwell, kind: kind.to_string() });
+        }
         match (o.against(), o.length()) {
             (Some(Against::Fixed(place)), _) if place >= self.fixed.len() => {
                 unknown("place", place, self.fixed.len())

@@ -287,11 +287,10 @@ fn dwell_reference(measure: &Measure, dwell: &Dwell) -> Option<(Reference, f64)>
             (low_m..=high_m).contains(&read.mean_m).then_some((read.mean_m, read.sigma_m))?
         }
     };
-    let reference = match (measure.kind, measure.against) {
-        (MeasureKind::Coincide, to) => Reference::Joined { to },
-        (MeasureKind::Distance, from) => Reference::Apart { from, length: measure.length, reading_m },
-        (MeasureKind::Plane, Against::Fixed(plane)) => Reference::Above { plane, reading_m },
-        (MeasureKind::Plane, Against::Feature(_)) => return None,
+    let (to, length) = (measure.against, measure.length);
+    let reference = match measure.kind {
+        MeasureKind::Coincide => Reference::Joined { to },
+        MeasureKind::Number(kind) => Reference::Number { kind: kind.name.into(), to, length, reading_m },
     };
     Some((reference, measure.sigma_m.hypot(own_m)))
 }

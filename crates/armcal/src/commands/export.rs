@@ -89,10 +89,9 @@ fn observation_json(o: &Observation) -> Value {
         }
         Reference::Tracked { position_m, .. } => json!({"position_m": position_m.as_slice()}),
         Reference::Joined { to } => json!({"joined_to": to}),
-        Reference::Apart { from, length, reading_m } => {
-            json!({"apart_from": from, "length": length, "reading_m": reading_m})
+        Reference::Number { kind, to, length, reading_m } => {
+            json!({"measured": kind, "to": to, "length": length, "reading_m": reading_m})
         }
-        Reference::Above { plane, reading_m } => json!({"above_plane": plane, "reading_m": reading_m}),
     };
     json!({
         "recording": o.dwell.recording, "dwell": o.dwell.dwell, "joint_rad": o.joint_rad, "reference": reference,

@@ -58,10 +58,9 @@ fn measured(model: &Model, truth: &[f64], n: usize, rng: &mut ChaCha8Rng) -> Vec
         let mut noise = || SIGMA_M * rng.sample::<f64, _>(StandardNormal);
         let distance_m = (tip_m - Vector3::from(POST_M)).norm() - value("bar.length") + noise();
         let height_m = normal.dot(&(tip_m - origin_m)) + noise();
-        for reference in [
-            Reference::Apart { from: Against::Fixed(0), length: 0, reading_m: distance_m },
-            Reference::Above { plane: 1, reading_m: height_m },
-        ] {
+        for reference in
+            [Reference::distance(Against::Fixed(0), 0, distance_m), Reference::height(1, height_m)]
+        {
             all.push(Observation {
                 covariance_m2: Matrix3::identity() * SIGMA_M.powi(2),
                 ..Observation::bare(dwell, q.clone(), reference)
@@ -159,7 +158,7 @@ fn one_point_from_many_sides_leaves_the_scale_open_and_a_known_distance_closes_i
     }
     let post = Against::Fixed(0);
     let touched = reached(&model, &truth, &Reference::Joined { to: post }, 80, &mut rng);
-    let apart = Reference::Apart { from: post, length: 0, reading_m: 0.0 };
+    let apart = Reference::distance(post, 0, 0.0);
     let spun = reached(&model, &truth, &apart, 80, &mut rng);
     let open = |observations: &[Observation]| {
         let found = fit(&model, observations, &FitConfig::default()).unwrap();

@@ -58,7 +58,7 @@ fn both([first, second]: &[Observation; 2], apart: bool) -> Observation {
     joint_rad.extend(&second.joint_rad);
     let other = Against::Feature(FeatureId::TIP);
     let joined = match apart {
-        true => Reference::Apart { from: other, length: 0, reading_m: 0.0 },
+        true => Reference::distance(other, 0, 0.0),
         false => Reference::Joined { to: other },
     };
     let mut both = Observation { feature: FeatureId(1), ..Observation::bare(first.dwell, joint_rad, joined) };
@@ -253,7 +253,7 @@ fn what_cannot_be_joined_is_said() {
         calibrate(&model, o, &FitConfig::default(), holdout).unwrap_err()
     };
     assert!(matches!(fit(&[], &HoldoutConfig::None), CalibrateError::NoObservations { .. }));
-    let linked = Reference::Apart { from: Against::Feature(FeatureId::TIP), length: 0, reading_m: 0.0 };
+    let linked = Reference::distance(Against::Feature(FeatureId::TIP), 0, 0.0);
     observations[1].reference = linked;
     let linkless = fit(&observations, &HoldoutConfig::None).to_string();
     assert!(

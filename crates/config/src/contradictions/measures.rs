@@ -62,10 +62,8 @@ fn find_contradiction(pipeline: &Pipeline, m: &MeasureSection) -> Option<(&'stat
             std::iter::once("tip").chain(pipeline.markers.keys().map(String::as_str)).collect();
         return Some(("between", format!("begins with `{of}`, which is none of {}", known.join(", "))));
     }
-    let (kind, known) = match m.kind {
-        MeasureKind::Plane => ("planes", &pipeline.planes),
-        MeasureKind::Coincide | MeasureKind::Distance => ("points", &pipeline.points),
-    };
+    let kind = m.kind.places();
+    let known = if kind == "planes" { &pipeline.planes } else { &pipeline.points };
     if !known.contains_key(against) {
         let problem = format!("ends with `{against}`, which is not there; add [{kind}.{against}]");
         return Some(("between", problem));
@@ -80,11 +78,11 @@ fn find_contradiction(pipeline: &Pipeline, m: &MeasureSection) -> Option<(&'stat
     if !positive(m.max_gap_mm) {
         return Some(("max_gap_mm", "must be above zero".into()));
     }
-    let is_distance = m.kind == MeasureKind::Distance;
-    if !is_distance && m.length_mm.is_some() {
+    let has_length = m.kind.has_length();
+    if !has_length && m.length_mm.is_some() {
         return Some(("length_mm", "belongs to kind = \"distance\"".into()));
     }
-    if is_distance && m.reading.is_none() && !m.length_mm.is_some_and(positive) {
+    if has_length && m.reading.is_none() && !m.length_mm.is_some_and(positive) {
         let problem = "must be above zero where no instrument reads the distance; give it, or `reading`";
         return Some(("length_mm", problem.into()));
     }

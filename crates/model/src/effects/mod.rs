@@ -86,7 +86,7 @@ pub(crate) use declared::Declared;
 pub(crate) use nominal_pose::NominalPose;
 pub(crate) use placed::Effects;
 
-use crate::ModelError;
+use crate::{ModelError, registry};
 use std::sync::OnceLock;
 
 /// The entries of the catalogue; each is called as its file, whose header is its documentation.
@@ -160,23 +160,9 @@ pub fn find(kind: &str) -> Option<&'static EffectKind> {
 /// # Errors
 /// The catalogue is in use already; a name that a spec cannot have, or that there is already; no family.
 pub fn register(kinds: &[&'static EffectKind]) -> Result<(), ModelError> {
-    let refused = |kind: &str, problem: &str| {
-        Err(ModelError::BadEffect { effect: kind.to_owned(), problem: problem.to_owned() })
-    };
-    let mut all = CATALOGUE.to_vec();
-    for kind in kinds {
-        let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-        if kind.name.is_empty() || !kind.name.chars().all(is_plain) {
-            return refused(kind.name, "the name of a kind has small letters, digits and underscores");
-        }
-        if all.iter().any(|other| other.name == kind.name) {
-            return refused(kind.name, "there is a kind of that name already");
-        }
-        if kind.family == Family::User {
-            return refused(kind.name, "its family is that of formulas in a pipeline: say which it is of");
-        }
-        all.push(*kind);
+    if let Some(kind) = kinds.iter().find(|kind| kind.family == Family::User) {
+        let problem = "its family is that of formulas in a pipeline: say which it is of";
+        return Err(ModelError::NotRegistered { name: kind.name.to_owned(), problem });
     }
-    let Err(_) = ALL.set(all) else { return Ok(()) };
-    refused(kinds.first().map_or("", |kind| kind.name), "the catalogue is in use: register kinds before")
+    registry::register(&ALL, CATALOGUE, kinds, |kind| kind.name)
 }

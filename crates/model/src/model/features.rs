@@ -1,10 +1,11 @@
 //! What can be measured of an arm: its tip, and markers on its links; and every frame of it, for drawing.
 
 use super::Model;
+use crate::measurements::find_measurement;
 use crate::rigid::Rigid;
 use crate::tree::{Route, SegmentId};
 use crate::twist::Twist;
-use armcal_core::{Against, FeatureId, Observation, Pose};
+use armcal_core::{Against, FeatureId, Observation, Pose, Reference};
 use nalgebra::Matrix6xX;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -151,10 +152,9 @@ impl Model {
             }
             _ => return self.marker_name(o.feature).map(str::to_owned),
         };
-        let how = match (o.is_scalar(), self.fixed[place].is_plane) {
-            (false, _) => "in",
-            (true, true) => "above",
-            (true, false) => "from",
+        let how = match &o.reference {
+            Reference::Number { kind, .. } => find_measurement(kind).map_or("at", |kind| kind.preposition),
+            _ => "in",
         };
         Some(format!("{} {how} {}", self.feature_name(o.feature), self.fixed[place].name))
     }

@@ -73,9 +73,8 @@ impl<'a> Linearisation<'a> {
                 }
                 Against::Fixed(place) => self.model.linearised_place(self.p, place),
             };
-            let sides = Sides { other, predicted, expected_m: self.model.expected_m(self.p, o) };
-            let among = (self.model.parameters.len(), self.model.length_of(o));
-            return sides.linearised(o, &columns, &of_other, among);
+            let sides = Sides { other, predicted, number: self.model.number_of(self.p, o) };
+            return sides.linearised(o, &columns, &of_other, self.model.parameters.len());
         }
         let board = self.model.board_under(o).zip(self.boards.get(&o.dwell.recording));
         let measured_m = measured_m(o, board.map(|(_, at)| &at.transform), &in_board_m);

@@ -4,34 +4,59 @@
 //! |---|--:|---|
 //! | in a point: tracked, seated, joined | 3 | `other - at` |
 //! | a tracked pose | 6 | the same, `Log(R_measured R_at')` |
-//! | a distance | 1 | `abs(other - at) - (length + reading)` |
-//! | a height above a plane | 1 | `reading - z . (at - other)` |
+//! | a number: a distance, a height, .. | 1 | `(length + reading) - number(at, other)` |
 //!
-//! With `d` the motion of `at`, `D` and `W` those of `other` and their unit vector `along` (from `at` to `other`, or the plane's
-//! z), one row of either kind changes by `along . (D - d) + (W x along) . (other - at)`: a distance does not see that it turns.
+//! With `d` the motion of `at`, `D` and `W` those of `other` and `along` the gradient of the number, one row changes by
+//! `along . (D - d) + (W x along) . (other - at)`. A point does not turn.
 
 use super::Model;
+use crate::measurements::{MeasurementKind, find_measurement};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad};
 use crate::rigid::Rigid;
 use crate::segment::LinearisedSegment;
 use crate::twist::Twist;
 use armcal_core::{Against, FeatureId, Observation, Pose, Reference};
-use nalgebra::{DMatrix, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
 
 /// What is measured and what is predicted of one observation.
 pub(super) struct Sides {
     /// What the tip is measured against, in the world; only its position counts, but of a plane.
     pub other: Rigid<f64>,
     pub predicted: Rigid<f64>,
-    /// What a distance or a height should be [m]: length and reading.
-    pub expected_m: f64,
+    /// What a number is, where one was measured.
+    pub number: Option<Number>,
+}
+
+/// A number that was measured.
+#[derive(Clone, Copy)]
+pub(super) struct Number {
+    kind: &'static MeasurementKind,
+    /// What it should be [m]: length and reading.
+    expected_m: f64,
+    /// The length that it counts from, among the parameters.
+    length: Option<usize>,
 }
 
 impl Sides {
     /// Of a position that is compared with a point.
     pub fn with_point(measured_m: Vector3<f64>, predicted: Rigid<f64>) -> Sides {
         let other = Rigid { translation_m: measured_m, ..Rigid::identity() };
-        Sides { other, predicted, expected_m: 0.0 }
+        Sides { other, predicted, number: None }
+    }
+
+    /// From the predicted point to the other [m].
+    fn gap_m(&self) -> Vector3<f64> {
+        self.other.translation_m - self.predicted.translation_m
+    }
+
+    /// What a number is off [m], and its gradient in the world: along it, the point would have to move by that.
+    fn error_of(&self, number: &Number) -> (f64, Vector3<f64>) {
+        let point_m = -self.gap_m();
+        let in_world = if number.kind.is_against_plane { self.other.rotation } else { Matrix3::identity() };
+        let (predicted_m, gradient) = number.kind.number.number_with_gradient(&in_world.tr_mul(&point_m));
+        // Where it has no slope, as a distance of nothing, any axis is as good.
+        let along = if gradient.iter().all(|g| g.is_finite()) { in_world * gradient } else { Vector3::x() };
+        (number.expected_m - predicted_m, along)
     }
 
     /// Where the tip should be [m]. Of a distance between two arms that is where the other tip is.
@@ -44,30 +69,18 @@ impl Sides {
 
     /// The residual; a rotation only where `turns` are asked for.
     pub fn residual(&self, o: &Observation, turns: bool) -> ModelResidual {
-        let gap_m = self.other.translation_m - self.predicted.translation_m;
-        let scalar = |along: Vector3<f64>, error_m: f64| ModelResidual {
-            position_m: along * error_m,
-            rotation_rad: None,
-            along: Some(along),
-        };
+        if let Some(number) = &self.number {
+            let (error_m, along) = self.error_of(number);
+            return ModelResidual { position_m: along * error_m, rotation_rad: None, along: Some(along) };
+        }
+        let gap_m = self.gap_m();
         match &o.reference {
-            Reference::Apart { .. } => {
-                // Any axis for no gap.
-                let along = gap_m.try_normalize(0.0).unwrap_or_else(Vector3::x);
-                scalar(along, gap_m.norm() - self.expected_m)
-            }
-            Reference::Above { .. } => {
-                let along: Vector3<f64> = self.other.rotation.column(2).into();
-                scalar(along, self.expected_m + along.dot(&gap_m))
-            }
             Reference::Tracked { orientation: Some(measured), .. } if turns => {
                 let predicted: UnitQuaternion<f64> = Pose::from(&self.predicted).rotation;
                 let rotation_rad = Some(rotation_error_rad(measured, &predicted));
                 ModelResidual { position_m: gap_m, rotation_rad, along: None }
             }
-            Reference::Tracked { .. } | Reference::Seated { .. } | Reference::Joined { .. } => {
-                ModelResidual { position_m: gap_m, rotation_rad: None, along: None }
-            }
+            _ => ModelResidual { position_m: gap_m, rotation_rad: None, along: None },
         }
     }
 
@@ -77,38 +90,32 @@ impl Sides {
         o: &Observation,
         of_tip: &[(usize, Twist)],
         of_other: &[(usize, Twist)],
-        (parameters, length): (usize, Option<usize>),
+        parameters: usize,
     ) -> (ModelResidual, DMatrix<f64>) {
         let residual = self.residual(o, true);
         let mut gap = DMatrix::zeros(3, parameters);
         of_tip.iter().for_each(|(k, twist)| add_to_column(&mut gap, 0, *k, &-twist.translation_m));
         of_other.iter().for_each(|(k, twist)| add_to_column(&mut gap, 0, *k, &twist.translation_m));
-        let Some(along) = residual.along else { return (residual, gap) };
+        let Some((number, along)) = self.number.zip(residual.along) else { return (residual, gap) };
         let mut row = DMatrix::from_fn(1, parameters, |_, column| along.dot(&gap.column(column)));
-        if let Reference::Above { .. } = o.reference {
-            let gap_m = self.other.translation_m - self.predicted.translation_m;
+        if number.kind.is_against_plane {
+            let gap_m = self.gap_m();
             for (k, twist) in of_other {
                 row[(0, *k)] += twist.rotation_rad.cross(&along).dot(&gap_m);
             }
         }
-        length.into_iter().for_each(|length| row[(0, length)] = -1.0);
+        number.length.into_iter().for_each(|length| row[(0, length)] = 1.0);
         (residual, row)
     }
 }
 
 impl Model {
-    /// Index of the length that the distance of an observation counts from.
-    pub(super) fn length_of(&self, o: &Observation) -> Option<usize> {
-        self.lengths.get(o.length()?).copied()
-    }
-
-    /// What a distance or a height should be [m]; zero where the tip should be in a point.
-    pub(super) fn expected_m(&self, p: &[f64], o: &Observation) -> f64 {
-        match o.reference {
-            Reference::Apart { reading_m, .. } => self.length_of(o).map_or(f64::NAN, |k| p[k]) + reading_m,
-            Reference::Above { reading_m, .. } => reading_m,
-            _ => 0.0,
-        }
+    /// The number that an observation is, if it is one that the model can make.
+    pub(super) fn number_of(&self, p: &[f64], o: &Observation) -> Option<Number> {
+        let Reference::Number { kind, length, reading_m, .. } = &o.reference else { return None };
+        let length = length.and_then(|length| self.lengths.get(length).copied());
+        let expected_m = length.map_or(0.0, |length| p[length]) + reading_m;
+        Some(Number { kind: find_measurement(kind)?, expected_m, length })
     }
 
     /// The other place of an observation: a point of the arms, or where a fixed place is.

@@ -47,7 +47,7 @@ impl<'a> Predicting<'a> {
         };
         let (predicted, in_board_m) = at(o.feature);
         match model.other(p, o, &|feature| at(feature).0) {
-            Some(other) => Sides { other, predicted, expected_m: model.expected_m(p, o) },
+            Some(other) => Sides { other, predicted, number: model.number_of(p, o) },
             None => {
                 let board = model.board_under(o).and_then(|_| self.boards.get(&o.dwell.recording));
                 Sides::with_point(measured_m(o, board, &in_board_m), predicted)

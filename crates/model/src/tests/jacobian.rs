@@ -183,8 +183,8 @@ proptest! {
         let post = Against::Fixed(0);
         for reference in [
             Reference::Joined { to: post },
-            Reference::Apart { from: post, length: 0, reading_m: 0.03 },
-            Reference::Above { plane: 1, reading_m: -0.02 },
+            Reference::distance(post, 0, 0.03),
+            Reference::height(1, -0.02),
         ] {
             let o = Observation { reference, ..seated(&joints, Vector3::zeros()) };
             model.check(std::slice::from_ref(&o)).expect("all of it is there");

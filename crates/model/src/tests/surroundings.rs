@@ -92,17 +92,14 @@ fn distances_and_heights_are_those_of_the_geometry() {
         rows[0]
     };
     let post = Against::Fixed(0);
-    // The bar shows 0.04 m beyond its 0.45 m, and the model has 0.01 m more.
-    assert!((error_m(Reference::Apart { from: post, length: 0, reading_m: 0.04 }) - 0.01).abs() < 1e-15);
-    assert!((error_m(Reference::Above { plane: 1, reading_m: -0.2 }) - 0.0).abs() < 1e-15);
-    assert!((error_m(Reference::Above { plane: 1, reading_m: -0.17 }) - 0.03).abs() < 1e-15);
+    // The bar shows 0.04 m beyond its 0.45 m, and the model has 0.01 m more: measured less predicted, as of a height.
+    assert!((error_m(Reference::distance(post, 0, 0.04)) + 0.01).abs() < 1e-15);
+    assert!((error_m(Reference::height(1, -0.2)) - 0.0).abs() < 1e-15);
+    assert!((error_m(Reference::height(1, -0.17)) - 0.03).abs() < 1e-15);
     // An offset of a plane is along its normal.
     let mut lifted = p.clone();
     lifted[model.index("plate.z").expect("a plane has an offset")] += 0.05;
-    let o = Observation {
-        reference: Reference::Above { plane: 1, reading_m: -0.2 },
-        ..seated(&q, Vector3::zeros())
-    };
+    let o = Observation { reference: Reference::height(1, -0.2), ..seated(&q, Vector3::zeros()) };
     assert!((model.residual(&lifted, &o).rows().sum::<f64>() - 0.05).abs() < 1e-15);
     let names: Vec<&str> = model.parameters().iter().map(|p| p.name.as_str()).collect();
     let own = ["post.x", "post.y", "post.z", "plate.z", "plate.rx", "plate.ry", "bar.length"];

@@ -2,7 +2,7 @@
 
 use super::joints::ZERO;
 use super::{Estimated, Freedom, Hypothesis};
-use armcal_config::{Measure, MeasureKind};
+use armcal_config::Measure;
 use armcal_core::units::DEGREES;
 use armcal_core::{Against, Parameter, Unit};
 use armcal_model::Arm;
@@ -127,7 +127,7 @@ fn model_files(inputs: &Inputs) -> Vec<(String, &[Parameter])> {
     let Inputs { pipeline, chain, .. } = inputs;
     let Streams { tip, bodies, .. } = &pipeline.streams;
     let measured = pipeline.measures();
-    let known = |m: &Measure| m.kind == MeasureKind::Distance && matches!(m.against, Against::Fixed(_));
+    let known = |m: &Measure| m.length.is_some() && matches!(m.against, Against::Fixed(_));
     let is_unseen = !measured.is_empty()
         && !measured.iter().any(known)
         && tip.is_none()
