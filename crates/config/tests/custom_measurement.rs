@@ -56,7 +56,7 @@ fn model() -> Model {
     };
     let place = |(k, (at_m, along)): (usize, (Vector3<f64>, Vector3<f64>))| {
         let turn = nalgebra::UnitQuaternion::rotation_between(&Vector3::z(), &along).expect("not opposite");
-        let frame = Frame::given(&format!("rail{k}"), Pose::from_parts(at_m.into(), turn));
+        let frame = Frame::given(format!("rail{k}"), Pose::from_parts(at_m.into(), turn));
         FixedPlace { frame, is_plane: true }
     };
     let places: Vec<FixedPlace> = rails().into_iter().enumerate().map(place).collect();
