@@ -27,7 +27,8 @@ impl Pipeline {
         // One number after the other, in the order of `lengths`.
         let mut lengths = 0..;
         let mut next = |counts: bool| if counts { lengths.next() } else { None };
-        let joined = self.closed_chain.iter().map(|closure| {
+        let mut all: Vec<Measure> = Vec::new();
+        all.extend(self.closed_chain.iter().map(|closure| {
             let [feature, to] = self.joins(closure);
             Measure {
                 name: "the other tip".into(),
@@ -43,9 +44,8 @@ impl Pipeline {
                 recordings: None,
                 max_gap_m: closure.max_gap_mm * 1e-3,
             }
-        });
-        let joined: Vec<Measure> = joined.collect();
-        let of_section = self.measure.iter().map(|section| Measure {
+        }));
+        all.extend(self.measure.iter().map(|section| Measure {
             name: section.name().to_owned(),
             kind: section.kind,
             feature: self.feature(&section.between[0]).unwrap_or_default(),
@@ -60,8 +60,8 @@ impl Pipeline {
                 all.filter(|(_, r)| names.contains(&r.name())).map(|(index, _)| index).collect()
             }),
             max_gap_m: section.max_gap_mm * 1e-3,
-        });
-        joined.into_iter().chain(of_section).collect()
+        }));
+        all
     }
 
     /// The joined features of the model: of two arms their tips.

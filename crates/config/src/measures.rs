@@ -16,7 +16,8 @@ pub struct MeasureSection {
     pub kind: MeasureKind,
     /// `"tip"` or a marker, then a point (for `"plane"`: a plane).
     pub between: [String; 2],
-    /// Of a kind that counts from a length, as a distance [mm]: what it is, or what it is where the instrument reads zero; default 0 with a `reading`.
+    /// Of a kind that counts from a length, as a distance does [mm]: what it is, or what it is where the instrument reads zero;
+    /// default 0 with a `reading`.
     pub length_mm: Option<f64>,
     /// How well that is known: `"given"` (default), `"measured"` with `length_sigma_mm`, `"estimated"`.
     #[serde(default)]
@@ -55,12 +56,9 @@ impl MeasureKind {
         matches!(self, MeasureKind::Number(kind) if kind.has_length)
     }
 
-    /// The section that its places are declared in.
-    pub(crate) fn places(self) -> &'static str {
-        match self {
-            MeasureKind::Number(kind) if kind.is_against_plane => "planes",
-            _ => "points",
-        }
+    /// Whether it is against a plane; otherwise against a point.
+    pub(crate) fn is_against_plane(self) -> bool {
+        matches!(self, MeasureKind::Number(kind) if kind.is_against_plane)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::{FeatureId, Observation};
 use nalgebra::{UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
 
 /// How the true position of the tip is known.
@@ -155,8 +155,8 @@ enum StoredReference {
     Tracked {
         position_m: Vector3<f64>,
         orientation: Option<UnitQuaternion<f64>>,
-        /// JSON has no infinity.
-        orientation_sigma_rad: Option<f64>,
+        #[serde(serialize_with = "finite", deserialize_with = "finite_or_infinity")]
+        orientation_sigma_rad: f64,
     },
     Joined {
         to: Against,
@@ -182,8 +182,7 @@ impl From<Reference> for StoredReference {
     fn from(reference: Reference) -> StoredReference {
         match reference {
             Reference::Seated { cavity, in_board_m } => StoredReference::Seated { cavity, in_board_m },
-            Reference::Tracked { position_m, orientation, orientation_sigma_rad: sigma_rad } => {
-                let orientation_sigma_rad = sigma_rad.is_finite().then_some(sigma_rad);
+            Reference::Tracked { position_m, orientation, orientation_sigma_rad } => {
                 StoredReference::Tracked { position_m, orientation, orientation_sigma_rad }
             }
             Reference::Joined { to } => StoredReference::Joined { to },
@@ -201,7 +200,6 @@ impl From<StoredReference> for Reference {
         match stored {
             StoredReference::Seated { cavity, in_board_m } => Reference::Seated { cavity, in_board_m },
             StoredReference::Tracked { position_m, orientation, orientation_sigma_rad } => {
-                let orientation_sigma_rad = orientation_sigma_rad.unwrap_or(f64::INFINITY);
                 Reference::Tracked { position_m, orientation, orientation_sigma_rad }
             }
             StoredReference::Joined { to } => Reference::Joined { to },
@@ -214,4 +212,13 @@ impl From<StoredReference> for Reference {
             }
         }
     }
+}
+
+/// A number, or nothing for infinity, which JSON does not have.
+fn finite<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    value.is_finite().then_some(*value).serialize(serializer)
+}
+
+fn finite_or_infinity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }

@@ -102,11 +102,10 @@ fn an_effect_registered_by_another_program_is_named_and_fitted() {
     let before = calibrated(&model, &observations);
     let (fit, holdout) = (FitConfig::default(), HoldoutConfig::CavityFolds { k: 5 });
     let config = DiagnosisConfig { resamplings: 199, ..DiagnosisConfig::default() };
-    let (calibration, observed) = (&before, &observations[..]);
     let c = Calibrated {
         model: &model,
-        calibration,
-        observations: observed,
+        calibration: &before,
+        observations: &observations,
         session: &session,
         fit: &fit,
         holdout: &holdout,

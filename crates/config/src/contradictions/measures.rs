@@ -62,8 +62,10 @@ fn find_contradiction(pipeline: &Pipeline, m: &MeasureSection) -> Option<(&'stat
             std::iter::once("tip").chain(pipeline.markers.keys().map(String::as_str)).collect();
         return Some(("between", format!("begins with `{of}`, which is none of {}", known.join(", "))));
     }
-    let kind = m.kind.places();
-    let known = if kind == "planes" { &pipeline.planes } else { &pipeline.points };
+    let (kind, known) = match m.kind.is_against_plane() {
+        true => ("planes", &pipeline.planes),
+        false => ("points", &pipeline.points),
+    };
     if !known.contains_key(against) {
         let problem = format!("ends with `{against}`, which is not there; add [{kind}.{against}]");
         return Some(("between", problem));

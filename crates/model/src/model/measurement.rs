@@ -10,7 +10,7 @@
 //! `along . (D - d) + (W x along) . (other - at)`. A point does not turn.
 
 use super::Model;
-use crate::measurements::{MeasurementKind, find_measurement};
+use crate::measurements::{DISTANCE, MeasurementKind, find_measurement};
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rad};
 use crate::rigid::Rigid;
 use crate::segment::LinearisedSegment;
@@ -110,12 +110,17 @@ impl Sides {
 }
 
 impl Model {
-    /// The number that an observation is, if it is one that the model can make.
+    /// The number that an observation is, if it is one; NaN of a kind or a length that there is not ([`Model::check`]).
     pub(super) fn number_of(&self, p: &[f64], o: &Observation) -> Option<Number> {
         let Reference::Number { kind, length, reading_m, .. } = &o.reference else { return None };
-        let length = length.and_then(|length| self.lengths.get(length).copied());
-        let expected_m = length.map_or(0.0, |length| p[length]) + reading_m;
-        Some(Number { kind: find_measurement(kind)?, expected_m, length })
+        let (known, index) = (find_measurement(kind), length.and_then(|length| self.lengths.get(length)));
+        let length_m = match (known, length, index) {
+            (Some(_), None, _) => 0.0,
+            (Some(_), Some(_), Some(index)) => p[*index],
+            _ => f64::NAN,
+        };
+        let kind = known.unwrap_or(&DISTANCE);
+        Some(Number { kind, expected_m: length_m + reading_m, length: index.copied() })
     }
 
     /// The other place of an observation: a point of the arms, or where a fixed place is.

@@ -113,6 +113,21 @@ fn places_that_the_model_does_not_have_are_named() {
     let o = Observation { reference: post, ..seated(&[0.0; 3], Vector3::zeros()) };
     let said = model.check(&[o]).expect_err("there is no place").to_string();
     assert!(said.contains("against place 0, and the model has 0"), "{said}");
+    // What nobody checked before is no number, and no measurement of something else.
+    let place = FixedPlace { frame: Frame::given("post", Pose::identity()), is_plane: false };
+    let standing = model.clone().against(&[place], &[]).expect("a new name");
+    let to = Against::Fixed(0);
+    let strange = Reference::Number { kind: "rail".into(), to, length: None, reading_m: 0.0 };
+    for (reference, why) in [
+        (strange, "\"rail\", which is no kind"),
+        (Reference::distance(to, 0, 0.1), "length 0, and the model has 0"),
+    ] {
+        let o = Observation { reference, ..seated(&[0.1; 3], Vector3::zeros()) };
+        let rows: Vec<f64> = standing.residual(&standing.nominal(), &o).rows().collect();
+        assert!(rows.len() == 1 && rows[0].is_nan(), "{why}: {rows:?}");
+        let said = standing.check(&[o]).expect_err("there is none").to_string();
+        assert!(said.contains(why), "{said}");
+    }
     let twice = FixedPlace { frame: Frame::given("tip", Pose::identity()), is_plane: false };
     let said = model.against(&[twice], &[]).expect_err("a name that is taken").to_string();
     assert!(said.contains("\"tip.x\""), "{said}");
