@@ -2,7 +2,7 @@
 
 use crate::support::{armcal, root, run_pipeline};
 use armcal_config::Pipeline;
-use armcal_pipeline::{settle, settle_again};
+use armcal_pipeline::{are_same_inputs, settle, settle_again};
 use armcal_result::Conclusions;
 use armcal_stages::Silent;
 use std::io::{BufRead as _, BufReader};
@@ -43,8 +43,9 @@ fn what_a_run_concluded_is_taken_from_its_results_and_shows_the_same() {
     for hidden in ["backlash", "outside:cable_drag", "nothing"] {
         let Finished { folder, pipeline, out } = finished(hidden);
         let loaded = Pipeline::load(&pipeline).expect("a pipeline");
-        let concluded = Conclusions::open(&out).expect("results");
-        let again = settle_again(&loaded, concluded, &Silent).expect("the same recordings");
+        let concluded = Conclusions::open(&out).expect("results").expect("conclusions");
+        assert!(are_same_inputs(&loaded, &concluded).expect("inputs"), "{hidden}");
+        let again = settle_again(&loaded, Some(concluded), &Silent).expect("the same recordings");
         assert!(again.concluded.is_some(), "{hidden}");
         // Of the live page everything that `summary.json` says is the same.
         let mut view = Command::new(env!("CARGO_BIN_EXE_armcal"))
@@ -74,6 +75,12 @@ fn what_a_run_concluded_is_taken_from_its_results_and_shows_the_same() {
     }
 }
 
+/// The first recording of a pipeline.
+fn loaded_recording(pipeline: &Path) -> PathBuf {
+    let loaded = Pipeline::load(pipeline).expect("a pipeline");
+    loaded.resolve(&loaded.recordings[0].paths[0])
+}
+
 #[test]
 fn conclusions_of_anything_else_are_drawn_again() {
     let Finished { folder, pipeline, out } = finished("backlash");
@@ -82,7 +89,11 @@ fn conclusions_of_anything_else_are_drawn_again() {
     let taken = |text: &str| {
         std::fs::write(&pipeline, text).expect("a pipeline");
         let loaded = Pipeline::load(&pipeline).expect("a pipeline");
-        settle_again(&loaded, Some(concluded()), &Silent).expect("recordings").concluded.is_some()
+        let settled = settle_again(&loaded, Some(concluded()), &Silent).expect("recordings");
+        // Before anything is read the same is known.
+        let same = are_same_inputs(&loaded, &concluded()).expect("inputs");
+        assert_eq!(same, settled.concluded.is_some());
+        same
     };
     assert!(taken(&text));
     assert!(!taken(&format!("{text}\n[diagnosis]\nmax_p_adjusted = 0.001\n")));
@@ -98,6 +109,13 @@ fn conclusions_of_anything_else_are_drawn_again() {
     let loaded = Pipeline::load(&other.pipeline).expect("a pipeline");
     assert!(settle_again(&loaded, Some(concluded()), &Silent).expect("recordings").concluded.is_none());
     assert!(settle(&loaded, &Silent).expect("recordings").concluded.is_none());
+    // One byte more behind the end of a recording: not the file that was read, whatever it gives.
+    let recording = loaded_recording(&pipeline);
+    let mut bytes = std::fs::read(&recording).expect("a recording");
+    bytes.push(0);
+    std::fs::write(&recording, bytes).expect("a recording");
+    let loaded = Pipeline::load(&pipeline).expect("a pipeline");
+    assert!(!are_same_inputs(&loaded, &concluded()).expect("inputs"));
     drop(folder);
 }
 

@@ -2,8 +2,9 @@
 
 use super::limits::Limits;
 use super::measured::Check;
-use super::numbers::{self, Told, all_warnings};
+use super::numbers;
 use super::reference::Calibrated;
+use super::told::{Told, all_warnings};
 use super::{frame_shifts, shifts, verdict};
 use crate::error::CheckError;
 use armcal_core::Severity;

@@ -19,6 +19,7 @@ mod reasons;
 pub mod reference;
 mod shifts;
 pub mod text;
+mod told;
 mod verdict;
 
 pub use error::CheckError;

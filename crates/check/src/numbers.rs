@@ -3,8 +3,8 @@
 use super::limits::Limits;
 use super::measured::Check;
 use super::reasons;
-use armcal_core::printable_name;
-use armcal_core::{ErrorStats, Severity, Warning};
+use super::told::{all_warnings, listed_up};
+use armcal_core::{ErrorStats, Severity, Warning, printable_name};
 use armcal_result::{RecordingRun, Run};
 
 /// Errors on points that the fit did not see.
@@ -97,19 +97,6 @@ fn check_rejections(recording: &RecordingRun, name: &str, limit: f64) -> Check {
     })
 }
 
-/// Rejections, parameters, warnings listed in one check.
-const LISTED: usize = 6;
-
-/// The first few, and how many more there are.
-pub fn listed_up(mut all: Vec<String>, what: &str) -> Vec<String> {
-    if all.len() > LISTED {
-        let more = all.len() - LISTED;
-        all.truncate(LISTED);
-        all.push(format!("And {more} more {what}."));
-    }
-    all
-}
-
 /// Warnings by severity.
 pub fn check_warnings(run: &Run, limits: &Limits) -> Vec<Check> {
     let most = limits.section.max_warnings.unwrap_or_default();
@@ -132,32 +119,6 @@ pub fn check_warnings(run: &Run, limits: &Limits) -> Vec<Check> {
             Some(check.saying(said, || listed_up(own, "warnings")))
         })
         .collect()
-}
-
-/// A warning, told with its recording.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Told {
-    /// How much it matters.
-    pub severity: Severity,
-    /// Its stable name.
-    pub code: String,
-    /// A sentence.
-    pub text: String,
-}
-
-/// Every warning of the run.
-pub fn all_warnings(run: &Run) -> Vec<Told> {
-    let told = |w: &Warning, text: String| Told {
-        severity: w.severity,
-        code: w.code.to_string(),
-        text: run.in_words(&printable_name(&text)),
-    };
-    let of_recordings = run
-        .recordings
-        .iter()
-        .flat_map(|r| r.all_warnings().into_iter().map(move |w| told(w, format!("`{}`: {w}.", r.name))));
-    let overall = run.overall_warnings().into_iter().map(|w| told(&w, format!("{w}.")));
-    of_recordings.chain(overall).collect()
 }
 
 fn severe_warnings<'w>(warnings: impl Iterator<Item = &'w Warning>) -> Vec<String> {

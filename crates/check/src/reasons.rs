@@ -1,7 +1,7 @@
 //! What a run shows about the cause of a broken limit, in sentences that end in what to look at.
 
 use super::limits::Limits;
-use super::numbers::{all_warnings, listed_up};
+use super::told::{all_warnings, listed_up};
 use armcal_calibrate::Estimate;
 use armcal_core::printable_name;
 use armcal_core::{Role, Severity};

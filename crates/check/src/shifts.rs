@@ -2,9 +2,9 @@
 
 use super::limits::Limits;
 use super::measured::Check;
-use super::numbers::listed_up;
 use super::reasons;
 use super::reference::{Calibrated, FittedParameter};
+use super::told::listed_up;
 use armcal_core::printable_name;
 use armcal_result::Run;
 

@@ -1,9 +1,11 @@
 //! What the user should know of a set-point, and why there is none.
 
+use crate::arm::observation_at;
 use crate::crossing::leap_rad;
 use crate::direction::Found;
 use crate::inverse::Miss;
-use crate::set_points::{Compensator, SetPoint, observation_at};
+use crate::set_point::SetPoint;
+use crate::set_points::Compensator;
 use crate::{CompensateError, Past, Target};
 use armcal_core::{Arrival, Observation, Unit};
 

@@ -5,7 +5,7 @@
 //! over a while around that moment, as a minimum-jerk move (Flash and Hogan 1985). The link then stops and starts by
 //! `a T^2 / 8` off its way, `a` its acceleration, `T` the time to cross.
 
-use crate::SetPoint;
+use crate::set_point::SetPoint;
 
 /// A set-point that leaps by this much more than the nominal one crosses a gap [rad] (sliding: [m]).
 const LEAP_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;

@@ -6,8 +6,8 @@
 //! really leads there. If a joint would travel the other way than assumed, its direction is turned and the problem
 //! solved again. Only the last step decides: what is returned is what the model predicts for the commanded path.
 
+use crate::arm::Arm;
 use crate::inverse::{Limits, Miss, solve};
-use crate::set_points::Arm;
 use crate::stored::Past;
 use armcal_core::Observation;
 use std::collections::VecDeque;

@@ -21,12 +21,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::print_stdout))]
 
 mod advice;
+mod arm;
 mod crossing;
 pub mod direction;
 pub mod drive;
 mod error;
 pub mod inverse;
-pub mod set_points;
+pub mod set_point;
+mod set_points;
 pub mod spline;
 pub mod stored;
 pub mod target;
@@ -34,10 +36,12 @@ pub mod target;
 #[cfg(test)]
 mod tests;
 
+pub use arm::Arm;
 pub use drive::{Drive, TargetFrame, held_joints};
 pub use error::CompensateError;
 pub use inverse::Limits;
-pub use set_points::{Arm, Compensator, Kind, Reached, SetPoint, Underway};
+pub use set_point::{Kind, Reached, SetPoint};
+pub use set_points::{Compensator, Underway};
 pub use spline::resample;
 pub use stored::Past;
 pub use target::{Conditions, ORIENTING_JOINTS, Target};

@@ -1,48 +1,16 @@
 //! One target after the other: the set-point of the nominal arm, the corrected one, and what each would reach.
 
+use crate::arm::{Arm, observation_at};
 use crate::crossing;
 use crate::direction::{Way, invert_model};
 use crate::inverse::{Limits, Miss};
+use crate::set_point::{Kind, Reached, SetPoint};
 use crate::{CompensateError, Conditions, Past, Target};
-use armcal_core::{Arrival, Observation};
-use armcal_model::{Model, ModelResidual};
-use nalgebra::{DMatrix, Vector3};
+use armcal_core::Observation;
+use nalgebra::Vector3;
 
 /// Postures from which a solution is tried, at most.
 const MOST_STARTS: usize = 6;
-/// A model and its parameters.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Arm<'a> {
-    /// The model.
-    pub model: &'a Model,
-    /// A value for each of its parameters.
-    pub values: Vec<f64>,
-}
-
-impl Arm<'_> {
-    pub(crate) fn linearised(
-        &self,
-        target: &Observation,
-        past: &Past,
-        q: &[f64],
-    ) -> (ModelResidual, DMatrix<f64>) {
-        self.model.residual_with_joint_jacobian(&self.values, &observation_at(target, past, q))
-    }
-
-    /// What is left to the target after this past: distance [m] and rotation [rad].
-    pub(crate) fn left(&self, target: &Observation, past: &Past, q: &[f64]) -> (f64, f64) {
-        let residual = self.model.residual(&self.values, &observation_at(target, past, q));
-        (residual.position_m.norm(), residual.rotation_rad.map_or(0.0, |r| r.norm()))
-    }
-}
-
-/// The target with readings and their past.
-pub(crate) fn observation_at(target: &Observation, past: &Past, q: &[f64]) -> Observation {
-    let mut o = target.clone();
-    past.clone().into_observation(q, &mut o);
-    o
-}
-
 /// Everything but the targets.
 #[derive(Debug, Clone)]
 pub struct Compensator<'a> {
@@ -62,47 +30,6 @@ pub struct Compensator<'a> {
     pub approach_rad: f64,
     /// Time in which a joint that turns back on a path crosses its gap [s]; 0 for one leap.
     pub crossing_s: f64,
-}
-
-/// What a row of the output is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    /// A target.
-    Target,
-    /// A point on the way to the target that follows, from which every joint moves in a known direction.
-    Approach,
-}
-
-/// What the calibrated model predicts for a target.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Reached {
-    /// Error of the tip at the nominal set-point [m].
-    pub before_m: f64,
-    /// The same at the corrected one [m].
-    pub after_m: f64,
-    /// Error of the orientation at both [rad], where one was asked for.
-    pub turn_rad: Option<[f64; 2]>,
-}
-
-/// A set-point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SetPoint {
-    /// The target.
-    pub target: Target,
-    /// Whether this is the target or the way to it.
-    pub kind: Kind,
-    /// What a controller with the nominal model commands [rad] (sliding: [m]).
-    pub nominal_rad: Vec<f64>,
-    /// What brings the tip there [rad] (sliding: [m]).
-    pub joint_rad: Vec<f64>,
-    /// Direction in which each joint arrives at the corrected set-point.
-    pub arrival: Vec<Arrival>,
-    /// Joints that are on their way through their gap here, as they turn back on a path: their links wait.
-    pub in_gap: Vec<usize>,
-    /// What both reach; `None` for an approach.
-    pub reached: Option<Reached>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
 }
 
 /// Where the arm stands between two targets, and what the way there left behind: driven by nominal and by corrected set-points.

@@ -9,6 +9,7 @@
 
 pub mod dwell;
 pub mod error_stats;
+pub mod feature;
 pub mod frames;
 pub mod gaps;
 pub mod mark;
@@ -25,9 +26,10 @@ pub mod warning;
 
 pub use dwell::{Arrival, Dwell, DwellId, GaugeReading, TipMeasurement};
 pub use error_stats::ErrorStats;
+pub use feature::FeatureId;
 pub use frames::{Pose, RollPitchYaw};
 pub use mark::{DwellMark, hash_of};
-pub use observation::{FeatureId, Load, Measured, Observation, Rejection};
+pub use observation::{Load, Measured, Observation, Rejection};
 pub use parameter::{Parameter, ParameterKind, Role};
 pub use printable::printable_name;
 pub use reference::{Against, Reference};

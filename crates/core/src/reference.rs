@@ -1,7 +1,6 @@
-//! What an observation is measured against: the one place where its kinds are told apart, beside the rows that the model makes
-//! of them.
+//! What an observation is measured against.
 
-use crate::{FeatureId, Observation};
+use crate::FeatureId;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
@@ -68,74 +67,6 @@ impl Reference {
     /// A height above a plane, along the plane's z axis: zero where it touches, else what a gauge shows.
     pub fn height(plane: usize, reading_m: f64) -> Reference {
         Reference::Number { kind: PLANE.into(), to: Against::Fixed(plane), length: None, reading_m }
-    }
-}
-
-/// What the kind of its reference says of an observation; everybody else asks these.
-impl Observation {
-    /// The cavity, if the tip was seated.
-    pub fn cavity(&self) -> Option<&str> {
-        match &self.reference {
-            Reference::Seated { cavity, .. } => Some(cavity),
-            _ => None,
-        }
-    }
-
-    /// Centre of the cavity that the tip was seated in, in the frame of the board [m].
-    pub fn in_board_m(&self) -> Option<&Vector3<f64>> {
-        match &self.reference {
-            Reference::Seated { in_board_m, .. } => Some(in_board_m),
-            _ => None,
-        }
-    }
-
-    /// Where a sensor saw it [m].
-    pub fn seen_m(&self) -> Option<&Vector3<f64>> {
-        match &self.reference {
-            Reference::Tracked { position_m, .. } => Some(position_m),
-            _ => None,
-        }
-    }
-
-    /// How a sensor saw it turned, and the standard error of that about each axis [rad].
-    pub fn seen_orientation(&self) -> Option<(&UnitQuaternion<f64>, f64)> {
-        match &self.reference {
-            Reference::Tracked { orientation, orientation_sigma_rad, .. } => {
-                Some((orientation.as_ref()?, *orientation_sigma_rad))
-            }
-            _ => None,
-        }
-    }
-
-    /// The place of the model that it was measured against; none of what a sensor saw, or of a cavity.
-    pub fn against(&self) -> Option<Against> {
-        match self.reference {
-            Reference::Joined { to } | Reference::Number { to, .. } => Some(to),
-            Reference::Seated { .. } | Reference::Tracked { .. } => None,
-        }
-    }
-
-    /// Which of the model's lengths a number counts from.
-    pub fn length(&self) -> Option<usize> {
-        match self.reference {
-            Reference::Number { length, .. } => length,
-            _ => None,
-        }
-    }
-
-    /// Whether one number was measured, a distance or a height, and not a position.
-    pub fn is_scalar(&self) -> bool {
-        matches!(self.reference, Reference::Number { .. })
-    }
-
-    /// What was measured, in words, and its coordinates or the one number [m]; none of what is only joined.
-    pub fn measured_values(&self) -> (&'static str, &[f64]) {
-        match &self.reference {
-            Reference::Seated { in_board_m, .. } => ("the position of the cavity", in_board_m.as_slice()),
-            Reference::Tracked { position_m, .. } => ("the measured position", position_m.as_slice()),
-            Reference::Number { reading_m, .. } => ("the reading", std::slice::from_ref(reading_m)),
-            Reference::Joined { .. } => ("nothing", &[]),
-        }
     }
 }
 

@@ -5,6 +5,9 @@ use armcal_calibrate::SignFlips;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// Resamplings of the bootstrap where another search decides: enough for the gate at one percent.
+pub(crate) const RESAMPLINGS: usize = 199;
+
 /// How the diagnosis weighs and decides. Defaults: `notes/diagnosis.md` section 9.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]

@@ -7,9 +7,9 @@ mod causes;
 mod costs;
 mod markers;
 
-use crate::cells::Unlisted;
-use crate::conditioned_problems::{ConditionedProblem, ConditionedProblems};
-use crate::projection::Projection;
+use crate::judge::conditioned_problems::{ConditionedProblem, ConditionedProblems};
+use crate::problem::projection::Projection;
+use crate::weigh::cells::Unlisted;
 use crate::weigh::{Outside, Weighed, weigh};
 use crate::{Correlation, DiagnosisConfig, LinearRefit, Problem, Scatter};
 use arm::{design, problem, rng};
@@ -163,7 +163,7 @@ fn evidence_equals_the_dense_marginal_likelihood() {
             let config = DiagnosisConfig { amplitude_scales: vec![a], ..Default::default() };
             let dense =
                 -0.5 * (ln_det - ln_det0) - 0.5 * (8.0 + rows) * ((8.0 + square) / (8.0 + square0)).ln();
-            let found = crate::evidence::ln_bayes(&projection.gram(&g), &projection, &config);
+            let found = crate::weigh::evidence::ln_bayes(&projection.gram(&g), &projection, &config);
             assert!(
                 (found - dense).abs() < 1e-5 * dense.abs().max(1.0),
                 "{} {a}: {found} {dense}",
@@ -177,14 +177,15 @@ fn evidence_equals_the_dense_marginal_likelihood() {
 fn leave_group_out_is_a_refit_without_the_group() {
     let p = small(3);
     let effect = p.candidates[0].columns.dense(&p.dwells, 1.0);
-    let stretches = crate::crossval::by_stretch(&p);
+    let stretches = crate::weigh::crossval::by_stretch(&p);
     assert!(stretches.iter().all(|g| g.scored.iter().all(|i| g.unseen.contains(i))));
     assert!(
         stretches.iter().any(|g| g.unseen.len() > g.scored.len()),
         "what is near in time is not seen either"
     );
-    let places = crate::crossval::by_place(&p);
-    let found = [&places, &stretches].map(|groups| crate::crossval::left_out(&p, Some(&effect), groups, 1.0));
+    let places = crate::weigh::crossval::by_place(&p);
+    let found =
+        [&places, &stretches].map(|groups| crate::weigh::crossval::left_out(&p, Some(&effect), groups, 1.0));
     let cases = places.iter().map(|g| (g, &found[0])).step_by(4);
     for (group, found) in cases.chain(stretches.iter().map(|g| (g, &found[1])).step_by(5)) {
         let keep: Vec<bool> = (0..p.dwells.len()).map(|i| !group.unseen.contains(&i)).collect();
@@ -196,7 +197,7 @@ fn leave_group_out_is_a_refit_without_the_group() {
         x.view_mut((0, 0), (rows, n)).copy_from(&cut.geometry);
         x.view_mut((0, n), (rows, m)).copy_from(&cut.candidates[0].columns.dense(&cut.dwells, 1.0));
         (0..n).for_each(|k| x[(rows + k, k)] = 1.0);
-        (0..m).for_each(|k| x[(rows + n + k, n + k)] = crate::crossval::EFFECT_PRECISION.sqrt());
+        (0..m).for_each(|k| x[(rows + n + k, n + k)] = crate::problem::EFFECT_PRECISION.sqrt());
         let mut y = DVector::zeros(rows + n + m);
         y.rows_mut(0, rows).copy_from(&cut.residual);
         let beta = x.svd(true, true).solve(&y, 1e-12).unwrap();
@@ -227,9 +228,10 @@ fn bootstrap_p_values_are_uniform_under_noise() {
         );
         let grams = p.candidates.iter().map(|c| (c, projection.gram(&c.columns.dense(&p.dwells, 1.0))));
         let directions: Vec<_> =
-            grams.map(|(c, gram)| crate::bootstrap::Direction::new(&c.columns, 1.0, &gram)).collect();
+            grams.map(|(c, gram)| crate::judge::bootstrap::Direction::new(&c.columns, 1.0, &gram)).collect();
         let clusters: Vec<Vec<usize>> = (0..p.dwells.len()).map(|i| vec![i]).collect();
-        let all = crate::bootstrap::wild_cluster(&projection, &directions, (&p.dwells, &clusters), &config);
+        let all =
+            crate::judge::bootstrap::wild_cluster(&projection, &directions, (&p.dwells, &clusters), &config);
         below += usize::from(all.iter().any(|s| s.p_adjusted <= 0.05));
     }
     assert!(below <= 8, "{below} of 60");
@@ -241,7 +243,7 @@ fn with_two_sockets_the_poses_are_the_groups() {
     for (i, d) in p.dwells.iter_mut().enumerate() {
         d.place = Some(format!("hole_{}", i % 2));
     }
-    let groups = crate::crossval::by_place(&p);
+    let groups = crate::weigh::crossval::by_place(&p);
     assert!(groups.len() >= 8, "two sockets are no sample, their poses are: {}", groups.len());
     let of = |i: usize| groups.iter().position(|g| g.scored.contains(&i)).unwrap();
     for i in 0..p.dwells.len() {

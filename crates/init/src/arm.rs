@@ -1,7 +1,7 @@
 //! The nominal arm: which of its joints are recorded, from which link to which.
 
-use super::channels::{Channels, JointTopic};
-use super::fields::Field;
+use super::channels::Channels;
+use super::topics::{Field, JointTopic};
 use crate::error::InitError;
 use armcal_core::Pose;
 use armcal_model::{Chain, Model, check_xml};

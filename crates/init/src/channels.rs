@@ -1,7 +1,8 @@
 //! What is on the channels of all recordings: joint names, tracked bodies, a thermometer, the robot's description.
 
-use super::fields::{Field, Fields};
+use super::fields::Fields;
 use super::files::Opened;
+use super::topics::{BodyTopic, JointTopic};
 use crate::error::InitError;
 use armcal_recording::decode::{Plan, Role, Rows, readable_as};
 use armcal_recording::{RawChannel, RawSchema, RecordingError, inflate_message};
@@ -17,50 +18,6 @@ const EVERY: u64 = 50;
 const MOST_NAMES: usize = 64;
 /// More types of messages than this that could hold joints, bodies or a temperature are no laboratory's.
 const MOST_TYPES: usize = 1000;
-
-/// A topic of joint readings.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointTopic {
-    /// Its topic.
-    pub topic: String,
-    /// The joints it names, in the order of the messages; empty where it names none.
-    pub names: Vec<String>,
-    /// Messages in all recordings.
-    pub messages: u64,
-    /// Where they are in a message that armcal does not know.
-    pub field: Option<Field>,
-}
-
-impl JointTopic {
-    /// What `--joints` calls it.
-    pub fn shown(&self) -> String {
-        self.field.as_ref().map_or_else(|| self.topic.clone(), |f| format!("{}:{}", self.topic, f.position))
-    }
-}
-
-/// A tracked body.
-#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct BodyTopic {
-    /// Its topic.
-    pub topic: String,
-    /// Its name, where the topic has several.
-    pub body: Option<String>,
-    /// The frame that it is compared with others in, where they hang on several.
-    pub frame: Option<String>,
-    /// Where it is in a message that armcal does not know.
-    pub position: Option<String>,
-    /// With `position`: how it is turned.
-    pub orientation: Option<String>,
-}
-
-impl BodyTopic {
-    /// What it is called where people read it.
-    pub fn shown(&self) -> String {
-        let what =
-            [&self.body, &self.position].into_iter().flatten().cloned().collect::<Vec<_>>().join(" at ");
-        if what.is_empty() { self.topic.clone() } else { format!("{what} of {}", self.topic) }
-    }
-}
 
 /// What all the recordings have in common, and what is left over.
 #[derive(Debug, Default)]

@@ -3,7 +3,7 @@
 //! Names decide nothing. Of lists of numbers, positions are what another list of the message tells the change of (their
 //! velocities) and what itself tells the change of none.
 
-use super::channels::{BodyTopic, JointTopic};
+use super::topics::{BodyTopic, Field, JointTopic};
 use armcal_recording::RawSchema;
 use armcal_recording::decode::{Place, Plan, Role, Rows, fields_for};
 use std::collections::BTreeSet;
@@ -21,21 +21,6 @@ const RATIO: std::ops::Range<f64> = 0.8..1.25;
 const FEWEST: usize = 20;
 /// What is zero in more than this share of the messages rests there, as velocities do.
 const RESTS: f64 = 0.1;
-
-/// Where joint readings are in a message.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Field {
-    /// Path of the positions.
-    pub position: String,
-    /// Path of the names of the joints, if they have any.
-    pub name: Option<String>,
-    /// How many joints.
-    pub values: usize,
-    /// How sure it is that these are positions: 3 where velocities tell their change, down to 0 where they are velocities.
-    pub surety: u8,
-    /// Why they are taken for positions.
-    pub why: String,
-}
 
 /// The fields of one topic that may matter.
 pub struct Fields {

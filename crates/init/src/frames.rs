@@ -1,7 +1,7 @@
 //! Bodies that hang on different frames of one tree of transforms, and the frame that they are all compared in.
 
-use super::channels::BodyTopic;
 use super::files::Opened;
+use super::topics::BodyTopic;
 use crate::error::InitError;
 use armcal_recording::{LengthUnit, Transforms};
 use armcal_stages::RunError;

@@ -15,6 +15,7 @@ mod evidence;
 mod fields;
 mod files;
 mod frames;
+mod known;
 mod motion;
 mod page;
 mod points;
@@ -23,12 +24,13 @@ mod read;
 mod roles;
 mod seats;
 mod sockets;
+mod topics;
 
 pub use arm::Told;
-pub use channels::BodyTopic;
 pub use error::InitError;
 pub use proposal::Proposal;
 pub use roles::{Cast, Role};
+pub use topics::BodyTopic;
 
 use armcal_calibrate::HoldoutConfig;
 use armcal_recording::input::Kind;
@@ -37,7 +39,7 @@ use armcal_stages::preprocess;
 use armcal_stages::{Inputs, Silent, Steps};
 use armcal_table::Board;
 use channels::Channels;
-use proposal::Known;
+use known::Known;
 use std::path::{Path, PathBuf};
 
 /// Pauses below which nothing can be calibrated.

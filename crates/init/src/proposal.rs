@@ -1,21 +1,14 @@
 //! The proposal: what was found, as the sections of a pipeline.
 
-use super::arm::Arm;
-use super::channels::BodyTopic;
+use super::Tried;
 use super::draft::Draft;
-use super::evidence::Evidence;
-use super::files::Opened;
+use super::known::Known;
 use super::page::{Page, toml_string};
-use super::points::Points;
-use super::read::AllRead;
 use super::roles::{Cast, Role};
-use super::seats::Seats;
-use super::sockets::Sockets;
-use super::{Asked, Tried};
+use super::topics::BodyTopic;
 use crate::error::InitError;
 use armcal_config::Pipeline;
 use armcal_recording::{atomic, seal_text};
-use armcal_table::Board;
 use std::path::{Path, PathBuf};
 
 /// First line of a proposal: what makes it one of armcal's files.
@@ -61,32 +54,6 @@ impl Proposal {
         }
         Ok(pipeline)
     }
-}
-
-/// Everything that was found out.
-pub struct Known<'a> {
-    /// What the user said.
-    pub asked: &'a Asked,
-    /// The recordings.
-    pub opened: &'a [Opened],
-    /// The arm.
-    pub arm: &'a Arm,
-    /// What was read.
-    pub read: &'a AllRead,
-    /// What the bodies did.
-    pub evidence: &'a [Evidence],
-    /// What they are.
-    pub cast: &'a [Cast],
-    /// Which of them fit the board.
-    pub seats: Option<Seats>,
-    /// The board of the user.
-    pub board: Option<(&'a Path, &'a Board)>,
-    /// Sockets without a drawing.
-    pub sockets: Option<Sockets>,
-    /// What a laser tracker exported, of each recording or of none.
-    pub points: Vec<Points>,
-    /// Numbers called temperatures, by topic and path.
-    pub warm: &'a [(String, String)],
 }
 
 impl Known<'_> {

@@ -1,9 +1,10 @@
 //! Everything that could matter, read as columns, with the units that the numbers themselves show.
 
 use super::arm::Arm;
-use super::channels::{BodyTopic, Channels, JointTopic};
+use super::channels::Channels;
 use super::files::Opened;
 use super::frames;
+use super::topics::{BodyTopic, JointTopic};
 use crate::error::InitError;
 use armcal_core::{Dwell, PoseSamples, Samples};
 use armcal_dwell::{DwellConfig, detect_dwells};

@@ -3,6 +3,7 @@
 mod carried;
 mod features;
 mod linearisation;
+mod measured;
 mod measurement;
 mod predicting;
 mod prediction;

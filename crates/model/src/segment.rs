@@ -4,7 +4,6 @@
 //! derivative of a segment with respect to each of its parameters comes from the same lines that predict.
 
 use crate::rigid::{Rigid, Scalar, matrix_product, rotation_of_vector};
-use crate::still::{Still, StillMoving};
 use crate::twist::Twists;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
@@ -161,18 +160,6 @@ impl<D: Scalar> Parts<D> {
 }
 
 impl Segment {
-    /// The transform from the frame before the segment to the one after it, predicted.
-    ///
-    /// `p` is the whole parameter vector and `joints` the whole joint vector; a joint that is missing is NaN.
-    pub fn transform(&self, p: &[f64], joints: &[f64]) -> Rigid<f64> {
-        Still::of(self, p).transform(joints)
-    }
-
-    /// [`Segment::transform`] and its derivatives.
-    pub fn linearised(&self, p: &[f64], joints: &[f64]) -> LinearisedSegment {
-        StillMoving::of(self, p).linearised(joints)
-    }
-
     /// What is constant before and behind the motion of its joint: `transform = before * motion * behind`.
     pub fn parted(&self, p: &[f64]) -> (Rigid<f64>, Rigid<f64>) {
         let parts = self.parts(&p[self.parameters.clone()]);

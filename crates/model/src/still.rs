@@ -11,6 +11,20 @@ use nalgebra::{SVector, Vector3};
 use num_dual::DualSVec64;
 use std::array;
 
+impl Segment {
+    /// The transform from the frame before the segment to the one after it, predicted.
+    ///
+    /// `p` is the whole parameter vector and `joints` the whole joint vector; a joint that is missing is NaN.
+    pub fn transform(&self, p: &[f64], joints: &[f64]) -> Rigid<f64> {
+        Still::of(self, p).transform(joints)
+    }
+
+    /// [`Segment::transform`] and its derivatives.
+    pub fn linearised(&self, p: &[f64], joints: &[f64]) -> LinearisedSegment {
+        StillMoving::of(self, p).linearised(joints)
+    }
+}
+
 /// A dual number that differentiates by all quantities of a segment at once.
 type Lanes = DualSVec64<MAX_PARAMETERS>;
 

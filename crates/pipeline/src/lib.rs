@@ -11,9 +11,11 @@ mod diagnosed;
 mod pool;
 mod refits;
 mod run;
+mod same_inputs;
 
 pub use converged::{Converged, settle, settle_again};
 pub use diagnosed::chosen_again;
 pub use pool::{PoolError, Pooled, calibrate_jointly};
 pub use refits::add_refits;
 pub use run::{recalibrate, run};
+pub use same_inputs::are_same_inputs;

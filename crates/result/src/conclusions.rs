@@ -24,6 +24,9 @@ pub struct Conclusions {
     schema: String,
     /// Hash of the [`Grounds`].
     grounds: String,
+    /// Hash of the [`InputFiles`]; empty of a version that did not write it.
+    #[serde(default)]
+    inputs: String,
     /// How the run calls things.
     pub called: Called,
     /// What contradicts the data about the setup.
@@ -54,13 +57,39 @@ impl Grounds<'_> {
         let models = model_texts.iter().cloned();
         let numbers =
             format!("{board:?} {observations:?} {:?}", (calibration.fit.values(), &calibration.residuals));
-        let mut hasher = Sha256::new();
-        for part in [VERSION.to_owned(), (*pipeline_text).to_owned(), numbers].into_iter().chain(models) {
-            hasher.update((part.len() as u64).to_le_bytes());
-            hasher.update(part);
-        }
-        hex::encode(hasher.finalize())
+        hash([VERSION.to_owned(), (*pipeline_text).to_owned(), numbers].into_iter().chain(models))
     }
+}
+
+/// What a run reads, known before anything of a recording is decoded: the same version makes the same of it.
+#[derive(Debug, Clone)]
+pub struct InputFiles<'a> {
+    /// Text of the pipeline.
+    pub pipeline_text: &'a str,
+    /// Texts of the nominal arms.
+    pub model_texts: &'a [String],
+    /// The board.
+    pub board: Option<&'a Board>,
+    /// What tells the files of every recording from others.
+    pub identities: Vec<Vec<String>>,
+}
+
+impl InputFiles<'_> {
+    fn hash(&self) -> String {
+        let InputFiles { pipeline_text, model_texts, board, identities } = self;
+        let others = [VERSION.to_owned(), (*pipeline_text).to_owned(), format!("{board:?} {identities:?}")];
+        hash(others.into_iter().chain(model_texts.iter().cloned()))
+    }
+}
+
+/// Of parts that cannot run into each other.
+fn hash(parts: impl Iterator<Item = String>) -> String {
+    let mut hasher = Sha256::new();
+    for part in parts {
+        hasher.update((part.len() as u64).to_le_bytes());
+        hasher.update(part);
+    }
+    hex::encode(hasher.finalize())
 }
 
 impl Conclusions {
@@ -69,10 +98,14 @@ impl Conclusions {
         let Run { pipeline_text, model_texts, board, observations, calibration, .. } = run;
         let grounds =
             Grounds { pipeline_text, model_texts, board: board.as_ref(), observations, calibration };
+        let board = board.as_ref();
+        let identities = run.recordings.iter().map(|r| r.files().into_iter().map(|f| f.identity).collect());
+        let inputs = InputFiles { pipeline_text, model_texts, board, identities: identities.collect() };
         let diagnosis = run.diagnosis.clone()?;
         Some(Conclusions {
             schema: SCHEMA.to_owned(),
             grounds: grounds.hash(),
+            inputs: inputs.hash(),
             called: run.called(),
             setup: run.setup.clone(),
             diagnosis,
@@ -102,6 +135,11 @@ impl Conclusions {
             diagnosis.refit(calibrated);
         }
         diagnosis
+    }
+
+    /// Whether they are of a run that read these.
+    pub fn are_of_inputs(&self, inputs: &InputFiles<'_>) -> bool {
+        self.inputs == inputs.hash()
     }
 
     /// Whether they were drawn from these.

@@ -40,7 +40,7 @@ pub use called::Called;
 pub use campaign::{Campaign, FailedRecording, Repeat};
 pub use column::Column;
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
-pub use conclusions::{Conclusions, FILE as CONCLUSIONS_FILE, Grounds};
+pub use conclusions::{Conclusions, FILE as CONCLUSIONS_FILE, Grounds, InputFiles};
 pub use error::ResultError;
 pub use files::{ObservedFile, sha256};
 pub use left_out::{INPUT_METADATA, OWN, PREFIX};

@@ -5,8 +5,9 @@
 
 use crate::keys::check_keys;
 use crate::tilt::MechanismFile;
-use crate::{Mechanism, TableError};
-use nalgebra::{Matrix3, Vector3};
+use crate::{Mechanism, TableError, Tilt};
+use armcal_core::Pose;
+use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -19,6 +20,9 @@ const LARGEST_MM: f64 = 10_000.0;
 
 /// A board on which no coordinate reaches this is written in metres [mm].
 const SMALLEST_BOARD_MM: f64 = 2.0;
+
+/// Slack on the limits, for angles that went through degrees and back [rad].
+const LIMIT_SLACK_RAD: f64 = 1e-9;
 
 /// A calibration board.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,6 +72,41 @@ impl Board {
     /// clearance, equal in all directions [m^2].
     pub fn seat_covariance_m2(&self) -> Matrix3<f64> {
         Matrix3::identity() * (self.cavity_sigma_m.powi(2) + self.seat_sigma_m.powi(2))
+    }
+
+    /// Pose of the board tilted by `tilt` in the frame it has at zero tilt (`frame_from_board`).
+    /// Zero tilt of a board without a mechanism is the identity.
+    ///
+    /// # Errors
+    /// A tilt beyond the mechanism's limits (the message says the limit), not finite, or not zero while
+    /// the board has no mechanism.
+    pub fn tilted(&self, tilt: Tilt) -> Result<Pose, TableError> {
+        let board = || self.name.clone();
+        if !(tilt.roll_rad.is_finite() && tilt.pitch_rad.is_finite()) {
+            return Err(TableError::TiltNotFinite { board: board() });
+        }
+        let Some(m) = &self.mechanism else {
+            return if tilt == Tilt::default() {
+                Ok(Pose::identity())
+            } else {
+                Err(TableError::NoMechanism { board: board() })
+            };
+        };
+        for (axis, value_rad, limit_rad) in
+            [("roll", tilt.roll_rad, m.max_roll_rad), ("pitch", tilt.pitch_rad, m.max_pitch_rad)]
+        {
+            if value_rad.abs() > limit_rad + LIMIT_SLACK_RAD {
+                return Err(TableError::TiltLimit {
+                    board: board(),
+                    axis,
+                    value_deg: value_rad.to_degrees(),
+                    limit_deg: limit_rad.to_degrees(),
+                });
+            }
+        }
+        let turn = UnitQuaternion::from_axis_angle(&m.pitch_axis, tilt.pitch_rad)
+            * UnitQuaternion::from_axis_angle(&m.roll_axis, tilt.roll_rad);
+        Ok(Translation3::from(m.pivot_m) * turn * Translation3::from(-m.pivot_m))
     }
 }
 

@@ -3,14 +3,10 @@
 //! `frame_from_board(tilt) = T(pivot) R(pitch about pitch_axis) R(roll about roll_axis) T(-pivot)`,
 //! the identity at zero tilt: roll turns with the board, pitch is fixed to the frame.
 
-use crate::{Board, TableError};
-use armcal_core::Pose;
-use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
+use crate::TableError;
+use nalgebra::{Unit, Vector3};
 use serde::Deserialize;
 use std::path::Path;
-
-/// Slack on the limits, for angles that went through degrees and back [rad].
-const LIMIT_SLACK_RAD: f64 = 1e-9;
 
 /// How a board tilts. Axes and pivot are in the board frame at zero tilt.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,43 +31,6 @@ pub struct Tilt {
     pub roll_rad: f64,
     /// Turn about the pitch axis [rad]; `pitch_deg` in a configuration.
     pub pitch_rad: f64,
-}
-
-impl Board {
-    /// Pose of the board tilted by `tilt` in the frame it has at zero tilt (`frame_from_board`).
-    /// Zero tilt of a board without a mechanism is the identity.
-    ///
-    /// # Errors
-    /// A tilt beyond the mechanism's limits (the message says the limit), not finite, or not zero while
-    /// the board has no mechanism.
-    pub fn tilted(&self, tilt: Tilt) -> Result<Pose, TableError> {
-        let board = || self.name.clone();
-        if !(tilt.roll_rad.is_finite() && tilt.pitch_rad.is_finite()) {
-            return Err(TableError::TiltNotFinite { board: board() });
-        }
-        let Some(m) = &self.mechanism else {
-            return if tilt == Tilt::default() {
-                Ok(Pose::identity())
-            } else {
-                Err(TableError::NoMechanism { board: board() })
-            };
-        };
-        for (axis, value_rad, limit_rad) in
-            [("roll", tilt.roll_rad, m.max_roll_rad), ("pitch", tilt.pitch_rad, m.max_pitch_rad)]
-        {
-            if value_rad.abs() > limit_rad + LIMIT_SLACK_RAD {
-                return Err(TableError::TiltLimit {
-                    board: board(),
-                    axis,
-                    value_deg: value_rad.to_degrees(),
-                    limit_deg: limit_rad.to_degrees(),
-                });
-            }
-        }
-        let turn = UnitQuaternion::from_axis_angle(&m.pitch_axis, tilt.pitch_rad)
-            * UnitQuaternion::from_axis_angle(&m.roll_axis, tilt.roll_rad);
-        Ok(Translation3::from(m.pivot_m) * turn * Translation3::from(-m.pivot_m))
-    }
 }
 
 #[derive(Deserialize)]
@@ -139,6 +98,8 @@ impl MechanismFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Board;
+    use armcal_core::Pose;
     use nalgebra::{Point3, point};
     use proptest::prelude::*;
 

@@ -3,7 +3,7 @@
 use super::{Outcome, print};
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::view::{Given, RefitSession, serve};
+use crate::view::{Given, Live, serve};
 use armcal_recording::input::{Kind, read_to_string};
 use armcal_result::SUMMARY;
 use std::path::Path;
@@ -13,18 +13,16 @@ pub fn run(input: &Path, port: u16) -> Result<Outcome, Error> {
     let given = Given::by(input)?;
     let path = given.pipeline.clone();
     let progress = Progress::new();
-    let session = RefitSession::of(given, &progress)?;
+    let live = Live::of(given, &progress)?;
     progress.finish();
     let written = read_to_string(&input.join(SUMMARY), Kind::Data);
-    if written.is_ok_and(|text| text != session.summary()) {
+    if written.is_ok_and(|text| text != live.summary()) {
         print(&format!(
             "{} holds other results than its pipeline and recordings give now; the page shows what they give now.\n",
             input.display()
         ))?;
     }
     crate::stdout::print_warnings(&armcal_recording::data_loss_warnings());
-    serve(session, port, |address| {
-        print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display()))
-    })?;
+    serve(live, port, |address| print(&format!("{}\nOpen {address} (Ctrl-C stops it)\n", path.display())))?;
     Ok(Outcome::Done)
 }

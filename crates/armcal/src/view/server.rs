@@ -2,6 +2,7 @@
 
 use super::connections::{self, REQUEST_TIME};
 use super::guard::Guard;
+use super::live::Live;
 use super::requests::{MOST_EFFECTS, Wanted};
 use super::session::RefitSession;
 use super::turns::{MOST_ASKED, Turns};
@@ -17,24 +18,21 @@ use axum::routing::{get, post};
 use serde_json::json;
 use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
+use tokio::task::JoinError;
 
 /// A question is a few names and a formula [bytes].
 const LARGEST_BODY: usize = 64 * 1024;
 
 /// Serves a bench on 127.0.0.1 until the process ends; calls `ready` with the address when it listens. Port 0 takes any
 /// free one.
-pub fn serve(
-    session: RefitSession,
-    port: u16,
-    ready: impl FnOnce(&str) -> Result<(), Error>,
-) -> Result<(), Error> {
+pub fn serve(live: Live, port: u16, ready: impl FnOnce(&str) -> Result<(), Error>) -> Result<(), Error> {
     let failed = |what: &'static str| move |source| Error::Serve { what, port, source };
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed("listening"))?;
     let port = listener.local_addr().map_err(failed("listening"))?.port();
     listener.set_nonblocking(true).map_err(failed("listening"))?;
     let guard = Guard::new(port).map_err(|e| failed("drawing a secret")(std::io::Error::other(e)))?;
     let address = format!("http://127.0.0.1:{port}/{}/", guard.secret);
-    let app = build_router(Arc::new(Served { session, turns: Turns::new() }), guard);
+    let app = build_router(Arc::new(Served { live, turns: Turns::new() }), guard);
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     // A thread each for the one that is computed and those that are written.
     let runtime =
@@ -48,7 +46,7 @@ pub fn serve(
 }
 
 struct Served {
-    session: RefitSession,
+    live: Live,
     turns: Turns,
 }
 
@@ -100,11 +98,13 @@ async fn arrived(request: Request, next: Next) -> Response {
 }
 
 async fn page(State(served): State<Arc<Served>>) -> Response {
-    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], served.session.html().to_owned()).into_response()
+    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], served.live.html().to_owned()).into_response()
 }
 
 async fn choices(State(served): State<Arc<Served>>) -> Response {
-    json_response(StatusCode::OK, &json!(served.session.choices()))
+    let choices =
+        move || served.live.session().map(|s| json!(s.choices()).to_string()).map_err(Error::to_string);
+    answered(tokio::task::spawn_blocking(choices).await)
 }
 
 /// Stops a refit when nobody waits for it any more: its request is dropped with the connection.
@@ -162,10 +162,17 @@ async fn asked(
         let why = format!("{} effects are wanted at once, and {MOST_EFFECTS} at most can be", wanted.count());
         return json_response(StatusCode::BAD_REQUEST, &json!({ "error": why }));
     }
-    let done = tokio::task::spawn_blocking(move || what(&served.session, &wanted)).await;
+    let done = move || {
+        let session = served.live.session().map_err(Error::to_string)?;
+        what(session, &wanted).map_err(|e| e.to_string())
+    };
+    answered(tokio::task::spawn_blocking(done).await)
+}
+
+fn answered(done: Result<Result<String, String>, JoinError>) -> Response {
     match done {
         Ok(Ok(text)) => ([(header::CONTENT_TYPE, "application/json")], text).into_response(),
-        Ok(Err(e)) => json_response(StatusCode::UNPROCESSABLE_ENTITY, &json!({ "error": e.to_string() })),
+        Ok(Err(why)) => json_response(StatusCode::UNPROCESSABLE_ENTITY, &json!({ "error": why })),
         Err(e) => json_response(StatusCode::INTERNAL_SERVER_ERROR, &json!({ "error": e.to_string() })),
     }
 }

@@ -2,20 +2,20 @@
 
 use super::requests::{Choices, Wanted};
 use super::source::Given;
+use super::texts::Texts;
 use crate::error::Error;
 use crate::extended::extend_pipeline;
-use crate::progress::Progress;
 use armcal_calibrate::{FitConfig, HoldoutConfig, Stop, calibrate};
 use armcal_config::Pipeline;
 use armcal_diagnose::Diagnosis;
 use armcal_model::{EffectSpec, Model, catalogue};
 use armcal_pipeline::Pooled;
 use armcal_recording::atomic;
-use armcal_report::{live_page, refit_json, report_html, summary_json};
+use armcal_report::refit_json;
 use armcal_result::sensitivity::Basis;
-use armcal_result::{REPORT, Refit, Run, SUMMARY, attached_texts};
-use armcal_stages::frames;
-use std::path::{Path, PathBuf};
+use armcal_result::{Refit, Run};
+use armcal_stages::{Steps, frames};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// A finished run, ready to be refitted.
@@ -28,42 +28,19 @@ pub struct RefitSession {
     own: Vec<EffectSpec>,
     run: Run,
     basis: Basis,
-    texts: Texts,
-}
-
-/// What results say in words.
-struct Texts {
-    /// The page that is served.
-    page: String,
-    /// `summary.json`.
-    summary: String,
-}
-
-impl Texts {
-    /// Those of a run.
-    fn of(run: &Run, basis: &Basis) -> Result<Texts, Error> {
-        let page = report_html(run, basis)?;
-        Ok(Texts { page: live_page(&page).unwrap_or(page), summary: summary_json(run)? })
-    }
-
-    /// Those that a run wrote into its `run.mcap`; none where that page cannot be served.
-    fn read(run: &Path) -> Result<Option<Texts>, Error> {
-        let [page, summary] = attached_texts(run, [REPORT, SUMMARY])?;
-        Ok(page.and_then(|page| live_page(&page)).zip(summary).map(|(page, summary)| Texts { page, summary }))
-    }
 }
 
 impl RefitSession {
-    /// Runs a pipeline, or pools `results` with it; what comes of it stays in memory.
-    pub fn of(given: Given, progress: &Progress) -> Result<RefitSession, Error> {
+    /// Runs a pipeline, or pools `results` with it; what comes of it stays in memory, and what it says in words.
+    pub fn of(given: &Given, progress: &dyn Steps) -> Result<(RefitSession, Texts), Error> {
         let Given { pipeline: path, results, concluded, run } = given;
         let (pipeline, geometry, run, texts) = match &results[..] {
             [] => {
-                let pipeline = Pipeline::load(&path)?;
-                let mut settled = armcal_pipeline::settle_again(&pipeline, concluded, progress)?;
+                let pipeline = Pipeline::load(path)?;
+                let mut settled = armcal_pipeline::settle_again(&pipeline, concluded.clone(), progress)?;
                 let geometry = settled.fitted.geometry.clone();
-                let earlier = run.filter(|_| settled.concluded.is_some());
-                let texts = earlier.as_deref().map(Texts::read).transpose()?.flatten();
+                let earlier = run.as_deref().filter(|_| settled.concluded.is_some());
+                let texts = earlier.map(Texts::read).transpose()?.flatten();
                 let run = if texts.is_some() {
                     // What was concluded from just this calibration was also fitted and written.
                     let diagnosis = settled.concluded.take().map(|concluded| concluded.diagnosis);
@@ -76,7 +53,7 @@ impl RefitSession {
                 (pipeline, geometry, run, texts)
             }
             results => {
-                let pipeline = Pipeline::load_for_others(&path)?;
+                let pipeline = Pipeline::load_for_others(path)?;
                 let Pooled { run, geometry } =
                     armcal_pipeline::calibrate_jointly(&pipeline, results, progress)?;
                 (pipeline, geometry, run, None)
@@ -85,17 +62,7 @@ impl RefitSession {
         let own = frames::effect_specs(&pipeline, &geometry)?;
         let basis = Basis::of(&run);
         let texts = texts.map_or_else(|| Texts::of(&run, &basis), Ok)?;
-        Ok(RefitSession { pipeline, path, geometry, own, run, basis, texts })
-    }
-
-    /// What `summary.json` of the run says.
-    pub fn summary(&self) -> &str {
-        &self.texts.summary
-    }
-
-    /// The page.
-    pub fn html(&self) -> &str {
-        &self.texts.page
+        Ok((RefitSession { pipeline, path: path.clone(), geometry, own, run, basis }, texts))
     }
 
     /// What can be chosen.

@@ -1,7 +1,8 @@
 //! Calibration without a camera: by a ballbar to a post, by a gauge above a plate, by a point that the tip is brought into.
 
 use super::rig;
-use crate::{Fit, FitConfig, HoldoutConfig, calibrate, fit, fit_frames};
+use crate::fit;
+use crate::{Fit, FitConfig, HoldoutConfig, calibrate, fit_frames};
 use armcal_core::{Against, DwellId, Observation, Pose, Reference};
 use armcal_model::{Chain, FixedPlace, Frame, Frames, Knowledge, Length, Model};
 use nalgebra::{Matrix3, Vector3};

@@ -1,4 +1,4 @@
-use crate::covariance::{Covariance, Own};
+use crate::outcome::covariance::{Covariance, Own};
 use nalgebra::{DMatrix, DVector};
 
 /// Seven parameters: two shared at 4 and 1, a group at 0 and 6, a group at 3; 2 and 5 are fixed.

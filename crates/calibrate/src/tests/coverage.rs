@@ -1,5 +1,6 @@
 use super::rig;
-use crate::{FitConfig, fit};
+use crate::FitConfig;
+use crate::fit;
 
 #[test]
 fn intervals_hold_the_planted_truth_95_percent_of_the_time() {

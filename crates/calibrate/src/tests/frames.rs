@@ -1,5 +1,6 @@
 use super::rig;
-use crate::{FitConfig, align_frames, fit, fit_frames};
+use crate::fit;
+use crate::{FitConfig, align_frames, fit_frames};
 use armcal_core::{DwellId, Observation, Pose, Reference};
 use armcal_model::{Frame, Frames, Model};
 use nalgebra::Vector3;

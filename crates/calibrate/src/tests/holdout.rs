@@ -1,5 +1,6 @@
 use super::rig;
-use crate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, calibrate, fit};
+use crate::fit;
+use crate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{DwellId, Observation, Pose, Reference};
 use armcal_model::{Frame, Model};
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! Two arms of the lab, which lays out its own axes, against the two models, tips joined.
 
-use crate::problem::Problem as _;
+use crate::objective::problem::Problem as _;
 use crate::{
     CalibrateError, Calibration, FitConfig, HoldoutConfig, ModelProblem, Objective, align_frames, calibrate,
 };

@@ -1,5 +1,6 @@
-use crate::problem::Problem;
-use crate::{FitConfig, Objective, Scale, Status, fit_problem};
+use crate::fit_problem;
+use crate::objective::problem::Problem;
+use crate::{FitConfig, Objective, Scale, Status};
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt as _;

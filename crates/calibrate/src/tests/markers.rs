@@ -1,10 +1,9 @@
 //! Several markers a pose: they share the encoders' noise, their side of the hold-out, and their weight.
 
 use super::rig;
-use crate::problem::Problem as _;
-use crate::{
-    FitConfig, HoldoutConfig, ModelProblem, align_frames, calibrate, fit, fit_frames, holdout_turns,
-};
+use crate::fit;
+use crate::objective::problem::Problem as _;
+use crate::{FitConfig, HoldoutConfig, ModelProblem, align_frames, calibrate, fit_frames, holdout_turns};
 use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
 use armcal_model::{Chain, Frame, Frames, Marker, Model};
 use nalgebra::{DMatrix, Matrix3xX, Vector3};

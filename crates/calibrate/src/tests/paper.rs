@@ -1,6 +1,8 @@
 use super::linear::{Linear, parameter};
 use super::rig;
-use crate::{FitConfig, Objective, Status, fit, fit_problem};
+use crate::fit;
+use crate::fit_problem;
+use crate::{FitConfig, Objective, Status};
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt as _;
 

@@ -1,8 +1,9 @@
 //! The structured solution against the dense one, which knows nothing of recordings.
 
 use super::rig;
-use crate::problem::Problem;
-use crate::{Calibration, Fit, FitConfig, HoldoutConfig, ModelProblem, Objective, calibrate, fit_problem};
+use crate::fit_problem;
+use crate::objective::problem::Problem;
+use crate::{Calibration, Fit, FitConfig, HoldoutConfig, ModelProblem, Objective, calibrate};
 use armcal_core::{Observation, Parameter, Pose};
 use armcal_model::{Frame, Knowledge, Model, RecordingStart};
 use nalgebra::{DMatrix, DVector, Vector3};

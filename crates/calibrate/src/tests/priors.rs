@@ -2,10 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
-use crate::fit::{Near, fit_near, fit_where_priors};
-use crate::priors::scales_of;
-use crate::problem::{Linearised, Problem};
-use crate::{FitConfig, Objective, Scale, fit_problem};
+use crate::fit::fit_problem::{Near, fit_near, fit_where_priors};
+use crate::fit::priors::scales_of;
+use crate::fit_problem;
+use crate::objective::problem::{Linearised, Problem};
+use crate::{FitConfig, Objective, Scale};
 use armcal_core::{Parameter, ParameterKind, Role, Unit};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};

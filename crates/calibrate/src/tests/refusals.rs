@@ -1,6 +1,8 @@
 use super::linear::{Linear, parameter};
 use super::rig;
-use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, calibrate, fit, fit_problem};
+use crate::fit;
+use crate::fit_problem;
+use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, calibrate};
 use armcal_core::{Observation, Reference};
 use nalgebra::{DMatrix, DVector, Matrix3};
 

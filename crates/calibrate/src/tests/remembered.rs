@@ -4,7 +4,7 @@
 
 use super::{Remembered, evaluate_problem};
 use crate::FitConfig;
-use crate::problem::{Linearised, Problem};
+use crate::objective::problem::{Linearised, Problem};
 use armcal_core::{Parameter, Role, Unit};
 use nalgebra::{DMatrix, DVector};
 use std::sync::atomic::{AtomicUsize, Ordering};

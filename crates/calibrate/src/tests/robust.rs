@@ -1,5 +1,6 @@
 use super::rig;
-use crate::{Fit, FitConfig, Objective, fit};
+use crate::fit;
+use crate::{Fit, FitConfig, Objective};
 use armcal_core::{Observation, Reference};
 use nalgebra::Vector3;
 

@@ -1,9 +1,9 @@
 use super::linear::parameter;
 use super::rig;
-use crate::problem::Problem;
-use crate::{
-    CalibrateError, FitConfig, Objective, Scale, WhitenedProblem, fit, fit_problem, whitened_problem,
-};
+use crate::fit;
+use crate::fit_problem;
+use crate::objective::problem::Problem;
+use crate::{CalibrateError, FitConfig, Objective, Scale, WhitenedProblem, whitened_problem};
 use armcal_core::{Parameter, Unit};
 use basin::{BoundedLevenbergMarquardt, BoxBounds, ConstraintDescription, ConstraintSet, Executor};
 use nalgebra::{DMatrix, DVector};

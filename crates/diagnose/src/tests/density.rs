@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::crossval::{by_place, left_out};
 use crate::tests::arm::{SIGMA_M, overconfident, rng};
 use crate::tests::{own, planted};
+use crate::weigh::crossval::{by_place, left_out};
 use nalgebra::{Matrix3, Matrix3xX, Rotation3, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use statrs::distribution::{Continuous, StudentsT};

@@ -7,6 +7,7 @@ use crate::LinearRefit;
 use crate::problem::Columns;
 use crate::tests::{arm, conditioned, entry, outside, own, quick, with_conditioned};
 use crate::weigh::weigh;
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// Half of the cavities: as clear, and a fraction of the time.

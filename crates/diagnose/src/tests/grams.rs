@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::columns::Cut;
-use crate::evidence::project_out_geometry;
 use crate::problem::Candidate;
+use crate::problem::columns::Cut;
 use crate::tests::planted;
+use crate::weigh::evidence::project_out_geometry;
 
 /// Columns of every form: a product of a base of two columns, waves, events that begin, end and never act, and dense ones.
 pub(crate) fn forms(problem: &Problem) -> Vec<Columns> {
@@ -68,7 +68,7 @@ fn what_is_left_of_products_without_some_dwells_is_what_is_left_of_their_columns
     let kept: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
     let rows: Vec<usize> = kept.iter().flat_map(|i| problem.dwells[*i].range()).collect();
     let fewer = problem.without(&keep);
-    let mut cut = crate::columns::Cut::default();
+    let mut cut = crate::problem::columns::Cut::default();
     for columns in forms(&problem) {
         let expected = columns.dense(&problem.dwells, 1.0).select_rows(&rows);
         let found = columns.select(&kept, &rows, &mut cut).dense(&fewer.dwells, 1.0);

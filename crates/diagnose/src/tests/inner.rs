@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::problem::{Candidate, Columns};
-use crate::settle::{Instead, Scored};
+use crate::search::accepted::{Instead, Scored};
 use crate::tests::arm::SIGMA_M;
 use crate::tests::{arm, conditioned, entry, own, planted, quick, scatter, with_conditioned};
 use armcal_core::DwellId;

@@ -3,12 +3,14 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::scatter::Correlation;
+use crate::judge::judged::Grade;
+use crate::judge::score::Difference;
 use crate::tests::{conditioned, entry, outside, own, planted, quick, scatter};
+use crate::weigh::scatter::Correlation;
 use crate::weigh::weigh;
 
 use armcal_core::DwellId;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::rc::Rc;
 
 /// A planted play in a conditioned problem of its own.
@@ -216,7 +218,7 @@ fn the_geometry_alone_is_fitted_with_its_prior() {
     }
     let expected = x.svd(true, true).solve(&y, 1e-12).unwrap();
     let products = armcal_calibrate::gram(&p.geometry);
-    assert!((base_fit(&p, &products, 3.0) - expected).amax() < 1e-9);
+    assert!((p.base_fit(&products, 3.0) - expected).amax() < 1e-9);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Several markers a pose: their rows share the encoders' noise, and one that came loose is told from all else.
 
 use super::quick;
-use crate::knowledge::Knowledge;
-use crate::view::View;
+use crate::robot::knowledge::Knowledge;
+use crate::robot::view::View;
 use crate::{Calibrated, Candidate, Diagnosis, Problem, Verdict, diagnose};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
@@ -97,7 +97,7 @@ impl Rig {
             fit,
             sizes: &sizes,
             knowledge: &knowledge,
-            places: &crate::places::places_of_poses(observations),
+            places: &crate::problem::places::places_of_poses(observations),
             products,
         }
         .problem()

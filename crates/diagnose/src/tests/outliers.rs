@@ -1,9 +1,9 @@
 //! What may be set aside, against planted accidents and against the covariance written out.
 
 use super::*;
-use crate::crossval::left_out;
 use crate::problem::Candidate;
 use crate::tests::arm::{Noise, SIGMA_M, design, overconfident, problem, rng};
+use crate::weigh::crossval::left_out;
 use nalgebra::{DMatrix, Vector3};
 use std::sync::Arc;
 

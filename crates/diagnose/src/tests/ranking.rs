@@ -4,8 +4,8 @@
 
 use super::*;
 use crate::diagnosis::CandidateReport;
-use crate::score::Difference;
-use crate::settle::tests::cases;
+use crate::judge::score::Difference;
+use crate::search::settle::tests::cases;
 use crate::tests::{arm, planted, quick};
 use crate::{Diagnosis, LinearRefit, Problem, Verdict, diagnose_problem};
 
@@ -121,8 +121,9 @@ fn several_effects_have_a_row_for_each_that_could_stand_in_the_place_of_one() {
 
 #[test]
 fn shares_of_several_effects_multiply() {
+    use crate::search::accepted::Scored;
     use crate::search::search;
-    use crate::settle::{Scored, resolve_names};
+    use crate::search::settle::resolve_names;
     use crate::tests::{conditioned as first_room, entry, with_conditioned};
     let (p, config) = (planted(&[("backlash:1", 1.0), ("zero_drift:2", 1.0)], 0, 3), quick());
     let base = first_room(&p, &config);

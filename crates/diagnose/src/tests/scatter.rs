@@ -8,7 +8,7 @@ use crate::weigh::weigh;
 
 fn of(p: &Problem) -> Scatter {
     let weighed = weigh(p, &quick());
-    Scatter::of(p, &weighed, &weighed.base.projected_residual())
+    weighed.scatter_of(p, &weighed.base.projected_residual())
 }
 
 /// One number a dwell and axis, in units of the declared noise.

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use super::*;
-use crate::crossval::{by_place, by_stretch};
 use crate::tests::{planted, quick};
+use crate::weigh::crossval::{by_place, by_stretch};
 use proptest::prelude::*;
 use rand_distr::{Distribution, Exp1};
 use std::collections::BTreeSet;

@@ -4,9 +4,9 @@
 
 use super::*;
 use crate::LinearRefit;
-use crate::forward::tests::{beside, planted, strong, told};
 use crate::problem::{Columns, Problem};
-use crate::settle::resolve_names;
+use crate::search::forward::tests::{beside, planted, strong, told};
+use crate::search::settle::resolve_names;
 use crate::tests::{arm, own, quick, with_conditioned};
 use crate::weigh::weigh;
 use std::sync::Arc;
@@ -16,12 +16,12 @@ fn something_is_missing_where_an_explanation_predicts() {
     let config = quick();
     let cell = |spec| [(spec, true, 0.5)];
     let mut r = told(("backlash:2", 1.0), &cell("backlash:1"));
-    assert!(is_something_missing(&r, &config), "however little the weighing likes it");
+    assert!(r.is_something_missing(&config), "however little the weighing likes it");
     r.weighed.p_nothing = config.max_probability_nothing;
-    assert!(!is_something_missing(&r, &config), "nothing may be missing");
+    assert!(!r.is_something_missing(&config), "nothing may be missing");
     // Another joint's play predicts nothing, and a listed one is no shape without a name.
-    assert!(!is_something_missing(&told(("backlash:1", 50.0), &cell("backlash:2")), &config));
-    assert!(!is_something_missing(&told(("backlash:1", 50.0), &[]), &config));
+    assert!(!told(("backlash:1", 50.0), &cell("backlash:2")).is_something_missing(&config));
+    assert!(!told(("backlash:1", 50.0), &[]).is_something_missing(&config));
 }
 
 #[test]

@@ -173,7 +173,7 @@ fn within_a_standard_error_the_simplest_comes_first_and_beyond_it_what_says_more
     let conditioned = crate::tests::conditioned(&p, &config);
     let (twin, simple) = (0, crate::tests::entry(&conditioned.weighed, "backlash:1"));
     // Four groups: 8 nats more, 5 of worth, each group 2 +- scatter.
-    let of = |each: [f64; 4]| crate::score::tests::score(&each);
+    let of = |each: [f64; 4]| crate::judge::score::tests::score(&each);
     for (scattered, first) in [([6.0, -2.0, 6.0, -2.0], simple), ([2.1, 1.9, 2.1, 1.9], twin)] {
         let members = [(twin, of(scattered)), (simple, of([0.0; 4]))];
         let set = simplest_first(members.iter().collect(), conditioned.costs(&config));
@@ -227,7 +227,7 @@ fn nothing_is_settled_where_nothing_was_found() {
 /// score nothing. The best that is not listed scores `unlisted`, at this cosine to the name.
 fn settled_where(own: [f64; 4], unlisted: [f64; 4], cosine: f64) -> Option<Accepted> {
     let config = quick();
-    let score = |each: &[f64; 4]| Some(crate::score::tests::score(each));
+    let score = |each: &[f64; 4]| Some(crate::judge::score::tests::score(each));
     let p = planted(&[("backlash:1", 1.0)], 0, 3);
     with_conditioned(&p, &config, |conditioned_problems| {
         let mut found = search(conditioned_problems, &[], &config).unwrap().accepted[0].clone();
@@ -243,7 +243,7 @@ fn settled_where(own: [f64; 4], unlisted: [f64; 4], cosine: f64) -> Option<Accep
         conditioned_problems.suppose(&[], &conditioned, score(&[0.0; 4]));
         let (of_unlisted, of_name) = (score(&unlisted).unwrap(), score(&own).unwrap());
         let above = of_unlisted.above(&of_name);
-        found.judged.unlisted = Some(crate::judge::Unlisted { score: of_unlisted, above, cosine });
+        found.judged.unlisted = Some(crate::judge::judged::Unlisted { score: of_unlisted, above, cosine });
         resolve_name(&found, &[], conditioned_problems, &config)
     })
 }
@@ -292,7 +292,7 @@ fn what_is_not_listed_is_told_beside_a_name_from_a_tenth_of_the_probability_on()
 /// and those that the user's knowledge leaves out. The name that was found is `backlash:1`.
 fn answered(p: &Problem, said: &[(&str, f64)], acts: &[&str]) -> (Vec<String>, Vec<String>) {
     let config = quick();
-    let each = |nats: f64| crate::score::tests::score(&[nats, nats + 0.01, nats, nats + 0.01]);
+    let each = |nats: f64| crate::judge::score::tests::score(&[nats, nats + 0.01, nats, nats + 0.01]);
     with_conditioned(p, &config, |conditioned_problems| {
         let found = search(conditioned_problems, &[], &config).unwrap().accepted[0].clone();
         let mut conditioned = (*found.conditioned).clone();
@@ -355,7 +355,7 @@ fn of_one_answer_what_is_known_to_act_is_told_and_the_others_are_named() {
 fn near_a_play(p: &Problem, gain: f64, more: &[(&str, f64)]) -> Vec<String> {
     let config = quick();
     let score = |nats: f64| {
-        crate::score::tests::score(&[nats / 4.0 + 0.01, nats / 4.0, nats / 4.0 - 0.01, nats / 4.0])
+        crate::judge::score::tests::score(&[nats / 4.0 + 0.01, nats / 4.0, nats / 4.0 - 0.01, nats / 4.0])
     };
     with_conditioned(p, &config, |conditioned_problems| {
         let mut found = search(conditioned_problems, &[], &config).unwrap().accepted[0].clone();
@@ -397,7 +397,7 @@ fn left_of_a_twin_and_nothing(nats: f64) -> Vec<Vec<String>> {
         let conditioned = found.accepted[0].conditioned.clone();
         let of = |spec: &str| renamed(&found.accepted[0], spec);
         let (twin, none) = (of("twin"), of("zero_drift:2"));
-        let score = |nats: f64| Some(crate::score::tests::score(&[nats, nats + 0.1, nats, nats]));
+        let score = |nats: f64| Some(crate::judge::score::tests::score(&[nats, nats + 0.1, nats, nats]));
         conditioned_problems.suppose(std::slice::from_ref(&twin.candidate), &conditioned, score(0.0));
         conditioned_problems.suppose(std::slice::from_ref(&none.candidate), &conditioned, score(0.0));
         for other in ["twin", "backlash:1"] {

@@ -13,6 +13,9 @@ use nalgebra::{Matrix4, Vector4};
 use super::profile::SpeedProfile;
 use crate::stats::HUBER_K;
 
+/// Fewest movements from which errors can be told.
+pub(crate) const MIN_MOVEMENTS: usize = 6;
+
 const MAX_ITERATIONS: usize = 60;
 
 /// Times the scale of the residuals is taken anew.

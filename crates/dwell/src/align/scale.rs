@@ -3,9 +3,8 @@
 use nalgebra::Vector3;
 use std::ops::Range;
 
-use super::fine::{Point, group_movements};
+use super::fine::{MIN_MOVEMENTS, Point, group_movements};
 use super::profile::SpeedProfile;
-use super::spread::MIN_MOVEMENTS;
 use crate::series::{breaking_gap_s, seconds_between, typical_period_s, unbroken_runs};
 use crate::{ClockConfig, DwellError};
 

@@ -17,10 +17,7 @@ use armcal_core::robust::mad_sigma;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector4};
 
 use super::deviated::Deviations;
-use super::fine::{Problem, Row, Start};
-
-/// Fewest movements from which errors can be told.
-pub(crate) const MIN_MOVEMENTS: usize = 6;
+use super::fine::{MIN_MOVEMENTS, Problem, Row, Start};
 
 /// Largest last step [s]: beyond a peak of the speed the linearisation means nothing.
 const LONGEST_STEP_S: f64 = 0.1;

@@ -2,8 +2,8 @@
 
 use super::Draft;
 use crate::error::InitError;
+use crate::known::Known;
 use crate::page::{toml_float, toml_path, toml_string};
-use crate::proposal::Known;
 use crate::roles::Role;
 use crate::seats::median_tilt_rad;
 use armcal_core::robust::median;

@@ -4,8 +4,8 @@ mod arm;
 mod streams;
 mod table;
 
+use super::known::Known;
 use super::page::Page;
-use super::proposal::Known;
 use armcal_recording::seal_text;
 use std::path::PathBuf;
 

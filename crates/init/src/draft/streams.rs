@@ -1,13 +1,13 @@
 //! Recordings, streams, clock: what is read, and as what.
 
 use super::Draft;
-use crate::channels::BodyTopic;
 use crate::evidence::Evidence;
 use crate::page::{toml_float, toml_list, toml_path, toml_string};
 use crate::points::Points;
 use crate::read::body_key;
 use crate::roles::Role;
 use crate::seats::table_tilts;
+use crate::topics::BodyTopic;
 use armcal_config::recording_name;
 use armcal_recording::{JointUnit, LengthUnit, StreamReport};
 use armcal_table::Tilt;

@@ -1,8 +1,8 @@
 //! A model at one parameter vector: residual and exact Jacobian of as many observations as are asked for.
 
 use super::Model;
+use super::measured::{measured_m, seated_m};
 use super::measurement::Sides;
-use super::prediction::{measured_m, seated_m};
 use crate::effects::Effects;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
 use crate::segment::{LinearisedSegment, Segment};

@@ -1,8 +1,8 @@
 //! A model at one parameter vector: what it predicts of as many observations as are asked for.
 
 use super::Model;
+use super::measured::{measured_m, seated_m};
 use super::measurement::Sides;
-use super::prediction::{measured_m, seated_m};
 use crate::residual::ModelResidual;
 use crate::rigid::Rigid;
 use crate::tree::TreeAt;

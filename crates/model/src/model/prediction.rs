@@ -2,10 +2,10 @@
 
 use super::Model;
 use super::linearisation::Linearisation;
+use super::measured::{measured_m, seated_m};
 use super::measurement::Sides;
 use super::predicting::Predicting;
 use crate::residual::{ModelResidual, add_to_column, rotation_error_rate};
-use crate::rigid::Rigid;
 use crate::segment::Segment;
 use crate::tree::Asked;
 use armcal_core::{Against, Observation, Pose};
@@ -142,19 +142,4 @@ impl Model {
     pub(super) fn board_under(&self, o: &Observation) -> Option<&Segment> {
         self.boards.get(&o.dwell.recording).filter(|_| o.cavity().is_some())
     }
-}
-
-/// Where the tip was, in the world [m]: as a sensor saw it, or the cavity of the board; NaN where there is no such board.
-pub(super) fn measured_m(
-    o: &Observation,
-    board: Option<&Rigid<f64>>,
-    in_board_m: &Vector3<f64>,
-) -> Vector3<f64> {
-    let in_board = || board.map_or(Vector3::repeat(f64::NAN), |board| board.point(in_board_m));
-    o.seen_m().copied().unwrap_or_else(in_board)
-}
-
-/// The seated point as the board's file gives it [m]; zero for one that is not seated.
-pub(super) fn seated_m(o: &Observation) -> Vector3<f64> {
-    o.in_board_m().copied().unwrap_or_else(Vector3::zeros)
 }

@@ -2,18 +2,16 @@
 
 use super::Converted;
 use super::inflate::inflate_message;
+use super::room::no_room;
 use crate::RecordingError;
-use crate::budget::Allowance;
-use crate::damage::{Damage, Faults};
-use crate::map::Map;
+use crate::bytes::budget::Allowance;
+use crate::bytes::map::Map;
+use crate::structure::damage::{Damage, Faults};
 use mcap::records::MessageHeader;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
-
-/// Metadata of a channel whose definition did not come with the file's messages: says where it is from.
-pub(crate) const DEFINITION_FROM: &str = "armcal.definition";
 
 /// Messages of a chunk [bytes]; a chunk is what one thread decodes.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -105,11 +103,6 @@ impl Copy {
         let damage: Vec<Damage> = faults.in_words();
         Ok(Converted { map, damage, log, known_here: Some(known_here) })
     }
-}
-
-/// Says that a copy cannot be written.
-pub(super) fn no_room(path: &Path) -> impl Fn(io::Error) -> RecordingError {
-    move |source| RecordingError::Copy { path: path.to_owned(), source }
 }
 
 fn copy_error(path: &Path, error: mcap::McapError) -> RecordingError {

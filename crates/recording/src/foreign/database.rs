@@ -3,8 +3,9 @@
 
 use super::copy::Copy;
 use super::wal::Frames;
-use crate::layout::hash_pair;
-use crate::{RecordingError, shortened};
+use crate::RecordingError;
+use crate::shortened;
+use crate::structure::layout::hash_pair;
 use rusqlite::ffi::{self, SQLITE_IOERR, SQLITE_IOERR_SHORT_READ};
 use rusqlite::{Connection, Error, ErrorCode};
 use std::path::Path;

@@ -1,10 +1,10 @@
 //! Files and messages that are compressed as a whole (zstd), as rosbag2 does with `compression_mode` FILE and MESSAGE.
 
-use super::copy::no_room;
+use super::room::no_room;
 use crate::RecordingError;
-use crate::budget::Allowance;
-use crate::damage::Damage;
-use crate::map::Map;
+use crate::bytes::budget::Allowance;
+use crate::bytes::map::Map;
+use crate::structure::damage::Damage;
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::{ErrorKind, Read as _, Write as _};

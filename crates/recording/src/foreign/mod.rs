@@ -14,21 +14,23 @@ mod database;
 mod definitions;
 mod inflate;
 pub(crate) mod names;
+mod room;
 mod rosbag2;
 mod wal;
 
-pub(crate) use copy::DEFINITION_FROM;
 #[cfg(test)]
 pub(crate) use definitions::{TYPES as KNOWN_TYPES, full_text as definition_of};
 pub use inflate::inflate_message;
-pub(crate) use wal::{identity as log_identity, logs_of};
+pub(crate) use wal::identity as log_identity;
 
-use crate::budget::Allowance;
+use crate::RecordingError;
 use crate::bytes::FileBytes;
-use crate::damage::Damage;
-use crate::map::Map;
-use crate::{RecordingError, url};
-use copy::{Copy, no_room};
+use crate::bytes::budget::Allowance;
+use crate::bytes::map::Map;
+use crate::bytes::url;
+use crate::structure::damage::Damage;
+use copy::Copy;
+use room::no_room;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Read as _, Write as _};

@@ -4,14 +4,17 @@
 //! immutable, so that SQLite makes neither a journal nor a lock. Where a recorder that died left a write-ahead log or
 //! a journal, both are copied, and the copy is opened.
 
-use super::copy::{Copy, no_room};
+use super::copy::Copy;
 use super::database::{
     Stored, compare_index, compare_log, compare_rows, is_of_disk, quick_check, read_error,
 };
 use super::definitions;
-use super::wal::{Frames, count_frames, identity, logs_of, path_beside};
-use crate::budget::{Allowance, FREE_VARIABLE, most_definition_bytes};
-use crate::{RecordingError, input};
+use super::room::no_room;
+use super::wal::{Frames, count_frames, identity};
+use crate::RecordingError;
+use crate::bytes::budget::{Allowance, FREE_VARIABLE, most_definition_bytes};
+use crate::bytes::input;
+use crate::bytes::logs::{logs_of, path_beside};
 use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;

@@ -1,30 +1,16 @@
 //! The files beside a database that hold what SQLite has not put into it yet: a write-ahead log or a journal.
 
-use crate::identity::prefixed_hash;
-use crate::{RecordingError, input};
-use std::ffi::OsString;
+use crate::RecordingError;
+use crate::bytes::identity::prefixed_hash;
+use crate::bytes::input;
+use crate::bytes::logs::logs_of;
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// Such files have the name of their database with these endings.
-const ENDINGS: [&str; 2] = ["-wal", "-journal"];
 /// Bytes of the header of a write-ahead log, and of the header of a page in it (SQLite file format, section 4.1).
 const HEADER_BYTES: usize = 32;
 const FRAME_BYTES: usize = 24;
-
-/// Those of a database that are there and hold anything, with their endings.
-pub(crate) fn logs_of(database: &Path) -> Vec<(&'static str, PathBuf)> {
-    let beside = |ending: &'static str| (ending, path_beside(database, ending));
-    let all = ENDINGS.into_iter().map(beside);
-    all.filter(|(_, path)| std::fs::metadata(path).is_ok_and(|about| about.len() > 0)).collect()
-}
-
-pub(super) fn path_beside(file: &Path, ending: &str) -> PathBuf {
-    let mut name = OsString::from(file);
-    name.push(ending);
-    PathBuf::from(name)
-}
 
 /// What tells the content of the logs of a database from any other; empty where there are none.
 pub(crate) fn identity(database: &Path) -> Result<String, RecordingError> {

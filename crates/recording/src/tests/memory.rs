@@ -1,7 +1,8 @@
 //! Peak memory does not depend on the size of the file (`examples/peak_memory.rs` measures it up to 1 GB).
 
-use crate::output::McapOutput;
-use crate::{Access, Extract, Recording, extract};
+use crate::extract;
+use crate::write::output::McapOutput;
+use crate::{Access, Extract, Recording};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;

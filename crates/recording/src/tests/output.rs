@@ -1,7 +1,7 @@
 //! What is written is read back, and the same twice.
 
 use super::{Style, attachments, mcap_bytes, opaque, open};
-use crate::output::McapOutput;
+use crate::write::output::McapOutput;
 use crate::{Recording, RecordingError};
 use std::collections::BTreeMap;
 use std::path::Path;

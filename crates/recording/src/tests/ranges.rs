@@ -1,7 +1,7 @@
 //! A file read by ranges gives what the same file mapped gives, and reads only what is wanted.
 
 use super::{OnDisk, Style, attachments, mcap_bytes, messages_of, opaque, raw_count};
-use crate::output::McapOutput;
+use crate::write::output::McapOutput;
 use crate::{Access, Recording, RecordingError, Source};
 use armcal_core::Severity;
 use mcap::records::{Record, op};

@@ -1,8 +1,8 @@
 //! From messages to columns: selection, clocks, cleaning, units, occlusion.
 
 use super::{OnDisk, Style, Track, mcap_bytes, open};
-use crate::records::{ENVELOPE, Records};
 use crate::ros2::{self, Header};
+use crate::structure::records::{ENVELOPE, Records};
 use crate::{
     Clock, Encoder, JointStream, JointUnit, LengthUnit, PoseStream, Recording, RecordingError, ScalarStream,
 };

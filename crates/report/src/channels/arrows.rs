@@ -1,6 +1,6 @@
 //! Error arrows, exaggerated by a stated factor and coloured by size; one topic a model, to be switched on and off.
 
-use super::scene::places_m;
+use super::places::places_m;
 use super::shapes::{Rgba, arrow, key_value, label, scene_entity};
 use super::{Messages, start_ns, timestamp};
 use armcal_result::analysis::round_factor;

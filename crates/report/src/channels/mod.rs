@@ -48,12 +48,13 @@ mod findings;
 mod frames;
 mod log;
 mod paths;
+mod places;
 pub(crate) mod robots;
 mod scene;
 mod shapes;
 
 pub(crate) use findings::{curve_topic, implied_topic};
-pub(crate) use scene::places_m;
+pub(crate) use places::places_m;
 
 use crate::findings::Findings;
 use armcal_core::Dwell;

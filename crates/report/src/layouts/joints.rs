@@ -1,5 +1,6 @@
 //! What the dwells say about each joint, by direction of arrival.
 
+use super::drawn::{What, tip_moving_joints};
 use super::panels::{BLUE, GREY, VERMILION, dot_series};
 use super::scale::axis_range;
 use super::spec::{Colour, Content, Direction, Plot};
@@ -7,7 +8,6 @@ use crate::channels::implied_topic;
 use crate::findings::Findings;
 use armcal_core::printable_name;
 use armcal_core::robust::percentile;
-use armcal_result::analysis::moves_tip;
 use armcal_result::proto::JointErrors;
 
 /// A joint on which the effects found act by less than this share of the largest is not drawn again.
@@ -17,49 +17,6 @@ const ABOVE_REST: f64 = 1.5;
 
 /// Columns of joints that fit beside each other on a laptop beside other panels.
 const SHOWN: usize = 2;
-
-/// What is drawn of a joint, split by direction of arrival.
-#[derive(Clone, Copy)]
-pub(super) enum What {
-    /// Of the calibrated model.
-    Error,
-    /// With everything found.
-    After,
-    /// What the effects found do.
-    Effect,
-}
-
-impl What {
-    /// All directions together, for the scale.
-    pub fn whole(self, m: &JointErrors) -> &[f64] {
-        match self {
-            What::Error => &m.error,
-            What::After => &m.error_after,
-            What::Effect => &m.effect,
-        }
-    }
-
-    fn words(self) -> &'static str {
-        match self {
-            What::Error => "",
-            What::After => " rest",
-            What::Effect => " effects",
-        }
-    }
-
-    fn suffix(self) -> &'static str {
-        match self {
-            What::Error => "",
-            What::After => "_after",
-            What::Effect => "_effect",
-        }
-    }
-}
-
-/// The joints that move the tip.
-pub(super) fn tip_moving_joints(f: &Findings) -> impl Iterator<Item = &JointErrors> {
-    f.joints.iter().filter(|m| moves_tip(&m.unit, m.error.iter().copied()))
-}
 
 /// Over its angle, where play and eccentricity show.
 pub(super) fn over_angle(f: &Findings, m: &JointErrors, what: What) -> Content {

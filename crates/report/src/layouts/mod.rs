@@ -6,6 +6,7 @@
 
 mod config;
 mod current;
+mod drawn;
 mod joints;
 mod legacy;
 mod panels;

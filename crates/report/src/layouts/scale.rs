@@ -1,6 +1,6 @@
 //! What the axes of joints reach to.
 
-use super::joints::{What, tip_moving_joints};
+use super::drawn::{What, tip_moving_joints};
 use crate::findings::Findings;
 use armcal_core::robust::{median, percentile};
 use armcal_result::proto::JointErrors;

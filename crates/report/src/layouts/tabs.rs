@@ -1,6 +1,7 @@
 //! What is shown where: what came out, where it fails, what is missing, whether the data can be trusted.
 
-use super::joints::{What, over_angle, over_torque, tip_moving_joints, what_effects_do};
+use super::drawn::{What, tip_moving_joints};
+use super::joints::{over_angle, over_torque, what_effects_do};
 use super::panels::{
     curve_plot, nominal_over_recorded_time, outward_error_panel, over_recorded_time, raw_panel, status_panel,
     steps_panel, table_panel,

@@ -6,9 +6,16 @@
 //! beyond these seven terms. Coefficients have independent normal priors of zero mean, which makes the
 //! best ones a ridge regression, axis by axis.
 
-use super::problem::Prior;
 use armcal_core::Pose;
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+/// Standard deviations of the coefficients of the [`Field`].
+#[derive(Clone, Copy)]
+pub(super) struct Prior {
+    pub offset_m: f64,
+    pub slope: f64,
+    pub curvature_per_m: f64,
+}
 
 const TERMS: usize = 7;
 /// Stretch of heights, one standard deviation. Small: a field that may press all heights together would

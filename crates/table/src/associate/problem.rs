@@ -1,5 +1,6 @@
 //! The data of one association: tips that can be used, how much each counts, and the priors in SI units.
 
+use super::field::Prior;
 use super::layout::Layout;
 use super::{BoardStart, DwellTip};
 use crate::{AssociationConfig, Board};
@@ -37,14 +38,6 @@ pub(super) struct Problem<'a> {
 pub(super) struct Site {
     pub at_m: Vector3<f64>,
     pub weight: f64,
-}
-
-/// Standard deviations of the coefficients of the [`Field`](super::field::Field).
-#[derive(Clone, Copy)]
-pub(super) struct Prior {
-    pub offset_m: f64,
-    pub slope: f64,
-    pub curvature_per_m: f64,
 }
 
 impl<'a> Problem<'a> {
