@@ -1,5 +1,6 @@
 use crate::support::{python_with, read_json, root, run_pipeline};
 use armcal_result::summary::summary_schema;
+use armcal_wording::warnings_page;
 use serde_json::Value;
 use std::process::Command;
 
@@ -96,6 +97,12 @@ fn the_schema_is_that_of_the_types() {
     let written = std::fs::read_to_string(&path).expect("the schema");
     let made = format!("{:#}\n", summary_schema());
     assert!(written == made, "run `cargo run -p armcal-dev -- schema > docs/summary.schema.json`");
+}
+
+#[test]
+fn every_kind_of_warning_is_in_the_docs() {
+    let written = std::fs::read_to_string(root().join("docs/warnings.md")).expect("docs/warnings.md");
+    assert!(written == warnings_page(), "run `cargo run -p armcal-dev -- warnings > docs/warnings.md`");
 }
 
 /// The program `jsonschema` of Python judges summaries by the schema: those of all kinds of runs hold, and none that lost a field.

@@ -47,7 +47,7 @@ pub use fit::ended::{Ended, fitted_values};
 pub use fit::export::{WhitenedProblem, whitened_problem};
 pub use fit::fit;
 pub use fit::fit_problem::fit_problem;
-pub use fit::fit_warnings::{ABOVE_FLOOR, ABOVE_NOISE, INADEQUATE, OUTLIERS};
+pub use fit::fit_warnings::INADEQUATE;
 pub use fit::frames::{align_frames, fit_frames, fit_frames_from};
 pub use holdout::calibration::{calibrate, calibrate_beside, holdout_turns};
 pub use objective::alike::AlikePoses;

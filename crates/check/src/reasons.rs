@@ -4,7 +4,7 @@ use super::limits::Limits;
 use super::told::{all_warnings, listed_up};
 use armcal_calibrate::Estimate;
 use armcal_core::printable_name;
-use armcal_core::{Role, Severity};
+use armcal_core::{Code, Role, Severity};
 use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport};
 use armcal_model::{EffectSpec, Since, Target};
 use armcal_result::{Run, Status};
@@ -29,7 +29,7 @@ pub fn of_run(run: &Run, limits: &Limits) -> Vec<String> {
 }
 
 /// The warning about a body that moved; here it is told with its cause.
-const MOVED: &str = "body-moved";
+const MOVED: Code = Code::BodyMoved;
 
 /// The table or the base moved while it was recorded.
 fn bodies_moved(run: &Run) -> Vec<String> {

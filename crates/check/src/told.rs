@@ -1,6 +1,6 @@
 //! Warnings of a run, told, and lists of what is said.
 
-use armcal_core::{Severity, Warning, printable_name};
+use armcal_core::{Code, Severity, Warning, printable_name};
 use armcal_result::Run;
 
 /// Rejections, parameters, warnings listed in one check.
@@ -21,8 +21,8 @@ pub fn listed_up(mut all: Vec<String>, what: &str) -> Vec<String> {
 pub struct Told {
     /// How much it matters.
     pub severity: Severity,
-    /// Its stable name.
-    pub code: String,
+    /// What it is.
+    pub code: Code,
     /// A sentence.
     pub text: String,
 }
@@ -31,7 +31,7 @@ pub struct Told {
 pub fn all_warnings(run: &Run) -> Vec<Told> {
     let told = |w: &Warning, text: String| Told {
         severity: w.severity,
-        code: w.code.to_string(),
+        code: w.code,
         text: run.in_words(&printable_name(&text)),
     };
     let of_recordings = run

@@ -7,6 +7,7 @@
 //! nanoseconds; every name carries its unit as a suffix. Display units exist only at the edges,
 //! through [`Unit`].
 
+pub mod code;
 pub mod dwell;
 pub mod error_stats;
 pub mod feature;
@@ -24,6 +25,7 @@ pub mod units;
 pub mod visited;
 pub mod warning;
 
+pub use code::Code;
 pub use dwell::{Arrival, Dwell, DwellId, GaugeReading, TipMeasurement};
 pub use error_stats::ErrorStats;
 pub use feature::FeatureId;

@@ -1,9 +1,9 @@
 //! Mistakes of wiring, files, frames and units: what is checked before any physics.
 
+use crate::Code;
 use crate::warning::{Severity, Stage, Warning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 
 /// How sure a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -18,8 +18,8 @@ pub enum Certainty {
 /// Something about the setup that contradicts the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SetupFinding {
-    /// Stable machine-readable name, `kebab-case`: `joint-sign`.
-    pub code: Cow<'static, str>,
+    /// What it is.
+    pub code: Code,
     /// The joint, stream, frame, board or recording it is about.
     pub subject: String,
     /// What was seen, what the change would do, and where to make it.
@@ -44,7 +44,7 @@ impl SetupFinding {
             Certainty::Possible => Severity::Notice,
             Certainty::Mistake => Severity::Inadequate,
         };
-        Warning::new(severity, Stage::Setup, self.code.clone(), self.subject.clone(), self.message.clone())
+        Warning::new(severity, Stage::Setup, self.code, self.subject.clone(), self.message.clone())
     }
 }
 
@@ -52,7 +52,7 @@ impl SetupFinding {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unseen {
     /// The code that the mistake would have.
-    pub code: Cow<'static, str>,
+    pub code: Code,
     /// What it would be about.
     pub subject: String,
     /// What was tried, and how one can tell.
@@ -65,7 +65,7 @@ impl Unseen {
         Warning::new(
             Severity::Notice,
             Stage::Setup,
-            "setup-not-testable",
+            Code::SetupNotTestable,
             self.subject.clone(),
             self.message.clone(),
         )
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn what_is_only_possible_gives_way_to_physics_that_leaves_no_more() {
         let finding = |certainty, before_mm, after_mm| SetupFinding {
-            code: "board-pose".into(),
+            code: Code::BoardPose,
             subject: "the board".to_owned(),
             message: String::new(),
             certainty,

@@ -1,8 +1,8 @@
 //! Warnings are data: collected by every stage, shown in terminal, page and MCAP alike.
 
+use crate::Code;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
 
 /// How much a warning matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -54,8 +54,8 @@ pub struct Warning {
     pub severity: Severity,
     /// Who noticed.
     pub stage: Stage,
-    /// Stable machine-readable name, `kebab-case`.
-    pub code: Cow<'static, str>,
+    /// What it is.
+    pub code: Code,
     /// The file, channel, dwell, cavity or parameter it is about.
     pub subject: String,
     /// One sentence: what was seen, and what to do next.
@@ -67,11 +67,11 @@ impl Warning {
     pub fn new(
         severity: Severity,
         stage: Stage,
-        code: impl Into<Cow<'static, str>>,
+        code: Code,
         subject: impl Into<String>,
         message: impl Into<String>,
     ) -> Warning {
-        Warning { severity, stage, code: code.into(), subject: subject.into(), message: message.into() }
+        Warning { severity, stage, code, subject: subject.into(), message: message.into() }
     }
 }
 

@@ -19,21 +19,25 @@ enum Cli {
     Mistakes(mistakes::Request),
     /// The JSON schema of `summary.json`, for docs/summary.schema.json.
     Schema,
+    /// Every kind of warning and finding, for docs/warnings.md.
+    Warnings,
 }
 
 fn main() -> ExitCode {
     let ended = match Cli::parse() {
         Cli::Score(asked) => score::run(&asked).map(|()| ExitCode::SUCCESS),
         Cli::Mistakes(asked) => mistakes::run(&asked).map_err(error::Error::from),
-        Cli::Schema => {
-            let text = format!("{:#}\n", armcal_result::summary::summary_schema());
-            armcal::stdout::print(&text).map(|()| ExitCode::SUCCESS).map_err(error::Error::from)
-        }
+        Cli::Schema => print_text(&format!("{:#}\n", armcal_result::summary::summary_schema())),
+        Cli::Warnings => print_text(&armcal_wording::warnings_page()),
     };
     ended.unwrap_or_else(|error| {
         print_stderr(&format!("error: {error}"));
         ExitCode::from(error.exit_code())
     })
+}
+
+fn print_text(text: &str) -> Result<ExitCode, error::Error> {
+    Ok(armcal::stdout::print(text).map(|()| ExitCode::SUCCESS)?)
 }
 
 #[expect(clippy::print_stderr, reason = "progress and errors of the command")]

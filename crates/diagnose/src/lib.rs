@@ -58,5 +58,4 @@ pub use robot::knowledge::Knowledge;
 pub use robot::nested::nested_validation;
 pub use robot::{Calibrated, diagnose};
 pub use verdict::diagnose_problem;
-pub use verdict::unexplained::UNEXPLAINED;
 pub use weigh::scatter::{Correlation, Scatter};

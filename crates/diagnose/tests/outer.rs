@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop")]
 
 use armcal_calibrate::{Calibration, FitConfig, HoldoutConfig, calibrate, compare_heldout};
-use armcal_core::{Arrival, DwellId, Observation, Pose, Reference, Severity};
+use armcal_core::{Arrival, Code, DwellId, Observation, Pose, Reference, Severity};
 use armcal_diagnose::{
     Calibrated, Diagnosis, DiagnosisConfig, JudgedOn, Verdict, diagnose, nested_validation,
 };
@@ -155,7 +155,7 @@ fn a_shift_that_ends_again_may_be_the_sensors_where_it_alone_saw_it() {
         let [shift] = d.effects.as_slice() else { panic!("{:?}", d.names) };
         assert!(shift.name.starts_with("frame_shift@0.30-4"), "{:?}", d.names);
         assert!(shift.set.iter().any(|name| name == doubt), "{:?}", shift.set);
-        let told = |d: &Diagnosis| d.warnings.iter().any(|w| w.code == "event-or-sensor");
+        let told = |d: &Diagnosis| d.warnings.iter().any(|w| w.code == Code::EventOrSensor);
         assert!(told(&d), "{:?}", d.warnings);
 
         // What stays is no passing fault.
@@ -325,7 +325,7 @@ fn a_joint_that_rests_anywhere_in_its_play_is_part_of_the_floor_once_the_play_is
         let spread = rest * width / WIDTH_RAD;
         assert!((0.33..0.47).contains(&spread), "{spread} of the play instead of 0.4");
         assert!(d.unexplained.is_none());
-        let said = &d.warnings.iter().find(|w| w.code == "rests-in-play").unwrap().message;
+        let said = &d.warnings.iter().find(|w| w.code == Code::RestsInPlay).unwrap().message;
         let floor_mm = 1e3 * refitted.noise_floor_m;
         let parts = [
             "joint 1 rests".to_owned(),
@@ -375,7 +375,7 @@ fn scatter_that_is_wider_than_the_play_is_not_the_play() {
     }
     let before = calibration(&model, &observations);
     let d = diagnosed(&model, &before, &observations);
-    assert!(d.warnings.iter().all(|w| w.code != "rests-in-play"), "{:?}", d.names);
+    assert!(d.warnings.iter().all(|w| w.code != Code::RestsInPlay), "{:?}", d.names);
     assert!(d.unexplained.is_some(), "{:?}", d.verdict);
 }
 
@@ -386,7 +386,7 @@ fn errors_alike_in_every_direction_are_no_rest_in_a_play() {
         let observations = scattered(observations, 3.0, seed);
         let d = diagnosed(&model, &calibration(&model, &observations), &observations);
         assert!(d.names.iter().any(|name| name == "backlash:1"), "{:?}", d.names);
-        assert!(d.warnings.iter().all(|w| w.code != "rests-in-play"), "{:?}", d.warnings);
+        assert!(d.warnings.iter().all(|w| w.code != Code::RestsInPlay), "{:?}", d.warnings);
     }
 }
 
@@ -415,7 +415,8 @@ fn errors_above_the_floor_without_an_explanation_are_unexplained() {
         assert!((15.0..25.0).contains(&left.times_floor), "{left:?}");
         assert!((left.times_floor / before.times_floor() - 1.0).abs() < 1e-9, "nothing was revisited");
         assert!(left.tried.listed > 20 && left.tried.unlisted > 20, "{left:?}");
-        let grave = d.warnings.iter().any(|w| w.code == "unexplained" && w.severity == Severity::Inadequate);
+        let grave =
+            d.warnings.iter().any(|w| w.code == Code::Unexplained && w.severity == Severity::Inadequate);
         assert!(grave, "{:?}", d.warnings);
     }
 }

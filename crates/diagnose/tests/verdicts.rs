@@ -92,7 +92,7 @@ fn a_wrong_noise_declaration_hides_nothing() {
         .collect();
     let d = run(overconfident(problem(&poses, &hidden, Noise::White, &mut r, false), 20.0));
     assert_eq!(d.effects.len(), 2, "{:?}", d.names);
-    assert!(d.warnings.iter().any(|w| w.code == "scatter-larger"));
+    assert!(d.warnings.iter().any(|w| w.code == armcal_core::Code::ScatterLarger));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The dwells of one recording.
 
-use armcal_core::{Dwell, DwellId, PoseSamples, Samples, Severity, Stage, TipMeasurement, Warning};
+use armcal_core::{Code, Dwell, DwellId, PoseSamples, Samples, Severity, Stage, TipMeasurement, Warning};
 use std::ops::Range;
 
 use crate::history::History;
@@ -146,7 +146,7 @@ impl Summary<'_> {
             |severity, code, message| Warning::new(severity, Stage::Dwell, code, subject.clone(), message);
         let mut warnings = Vec::new();
         if dwells.is_empty() {
-            warnings.push(say(Severity::Inadequate, "no-dwells", self.why_none(found)));
+            warnings.push(say(Severity::Inadequate, Code::NoDwells, self.why_none(found)));
         } else if found.too_short_s.len() > 3.max(dwells.len() / 2) {
             let longest_s = found.too_short_s.iter().copied().fold(0.0, f64::max);
             let message = format!(
@@ -156,7 +156,7 @@ impl Summary<'_> {
                 self.config.min_duration_s,
                 dwells.len()
             );
-            warnings.push(say(Severity::Notice, "short-pauses", message));
+            warnings.push(say(Severity::Notice, Code::ShortPauses, message));
         }
         warnings.extend(dwells.windows(2).filter_map(|pair| self.split(&pair[0], &pair[1])));
         warnings.extend(self.creep(found));
@@ -164,14 +164,14 @@ impl Summary<'_> {
         let varying = |d: &&Dwell| d.joint_spread_rad.iter().any(|s| *s > 0.0);
         let (of, least) = (dwells.len(), self.config.min_effective_samples);
         let poor = dwells.iter().filter(varying).filter(few);
-        warnings.extend(dwell_notice("few-effective-samples", "dwells", poor, |n, list| {
+        warnings.extend(dwell_notice(Code::FewEffectiveSamples, "dwells", poor, |n, list| {
             format!(
                 "{n} dwells are worth fewer than {least} independent readings ({list}); their standard errors are rough, \
                  hold each pose longer"
             )
         }));
         let blind = dwells.iter().filter(|d| self.tip.is_some() && d.tip.is_none());
-        warnings.extend(dwell_notice("dwell-without-tip", "dwells", blind, |n, list| {
+        warnings.extend(dwell_notice(Code::DwellWithoutTip, "dwells", blind, |n, list| {
             format!(
                 "{n} of {of} dwells have no tip measurement, the sensor did not see the tip then ({list})"
             )
@@ -179,7 +179,7 @@ impl Summary<'_> {
         // They keep what was seen of the others.
         let unseen = |(name, _): &(&String, Tip<'_>)| {
             let blind = dwells.iter().filter(|d| !d.markers.contains_key(*name));
-            dwell_notice("dwell-without-marker", &format!("marker {name}"), blind, |n, list| {
+            dwell_notice(Code::DwellWithoutMarker, &format!("marker {name}"), blind, |n, list| {
                 format!(
                     "the sensor saw it in {} of {of} dwells, not in {list}; what else was seen then is used",
                     of - n
@@ -205,7 +205,7 @@ impl Summary<'_> {
             by_rad.abs().to_degrees(),
             list_dwells(&which)
         );
-        Some(Warning::new(Severity::Notice, Stage::Dwell, "dwell-creeps", "dwells", message))
+        Some(Warning::new(Severity::Notice, Stage::Dwell, Code::DwellCreeps, "dwells", message))
     }
 
     /// Two dwells at one pose with a broken stream between them were one.
@@ -223,7 +223,7 @@ impl Summary<'_> {
                  the second was reached from is unknown",
                 seconds_between(before.end_ns, after.start_ns)
             );
-            Warning::new(Severity::Notice, Stage::Dwell, "dwell-split-by-gap", after.id.to_string(), message)
+            Warning::new(Severity::Notice, Stage::Dwell, Code::DwellSplitByGap, after.id.to_string(), message)
         })
     }
 
@@ -270,7 +270,7 @@ impl Summary<'_> {
 
 /// What is to be noticed of some dwells, given how many and which; nothing of none.
 fn dwell_notice<'d>(
-    code: &'static str,
+    code: Code,
     subject: &str,
     dwells: impl Iterator<Item = &'d Dwell>,
     message: impl Fn(usize, String) -> String,

@@ -1,6 +1,6 @@
 use super::*;
 use crate::testkit::{Formula, Random, Session, ns, tip_m};
-use armcal_core::{Arrival, JointSamples, PoseSamples, ScalarSamples};
+use armcal_core::{Arrival, Code, JointSamples, PoseSamples, ScalarSamples};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 
@@ -122,7 +122,7 @@ fn dwells_of_an_arm_that_gives_way_are_kept_once_with_the_settled_reading() {
             with_creep(&s, &mut joints, |j, t_s, _| at(j, t_s));
             let (dwells, warnings) = detect(&only_joints(joints));
             assert_eq!(dwells.len(), 8, "{name} seed {seed}");
-            let said = warnings.iter().any(|w| w.code == "dwell-creeps");
+            let said = warnings.iter().any(|w| w.code == Code::DwellCreeps);
             assert!(said || steady_deg_s == 0.0, "{name} seed {seed}: {warnings:?}");
             for (found, (d, pose)) in dwells.iter().zip(s.dwells_s.iter().zip(&s.poses_rad)) {
                 let since_s = |t: i64| (t - ns(d.0)) as f64 * 1e-9;
@@ -228,7 +228,7 @@ fn every_marker_that_was_seen_is_measured_and_one_that_was_hidden_is_counted() {
         let error_m = (d.markers["elbow"].position_m - tip_m(&s.poses_rad[d.id.dwell], 1.0)).norm();
         assert!(error_m < 1e-4, "{error_m}");
     }
-    let said: Vec<&Warning> = warnings.iter().filter(|w| w.code == "dwell-without-marker").collect();
+    let said: Vec<&Warning> = warnings.iter().filter(|w| w.code == Code::DwellWithoutMarker).collect();
     assert_eq!(said.len(), 1, "{warnings:?}");
     assert_eq!(said[0].subject, "marker hand");
     assert!(
@@ -307,7 +307,7 @@ fn a_gap_or_a_nan_splits_a_dwell_and_is_said() {
         assert_eq!(dwells.len(), 3);
         assert_eq!(dwells[1].arrival, vec![Arrival::Positive; 3]);
         assert_eq!(dwells[2].arrival, vec![Arrival::Unknown; 3]);
-        let said: Vec<&Warning> = warnings.iter().filter(|w| w.code == "dwell-split-by-gap").collect();
+        let said: Vec<&Warning> = warnings.iter().filter(|w| w.code == Code::DwellSplitByGap).collect();
         assert!(said.len() == 1 && said[0].message.contains(gap_s), "{warnings:?}");
     }
     // A short interruption at the same pose, without a gap, does not.
@@ -335,7 +335,7 @@ fn no_dwells_comes_with_the_threshold_that_would_find_some() {
     let (dwells, warnings) = detect(&samples);
     assert!(dwells.is_empty());
     let message = &warnings[0].message;
-    assert_eq!(warnings[0].code, "no-dwells");
+    assert_eq!(warnings[0].code, Code::NoDwells);
     let proposed = message
         .split("joint_floor_deg = ")
         .nth(1)
@@ -360,7 +360,7 @@ fn an_arm_that_never_rests_has_no_dwells() {
     let time_ns = (0..n).map(|i| ns(f64::from(i) * 0.01)).collect();
     let (dwells, warnings) =
         detect(&only_joints(JointSamples { time_ns, joint_rad, ..JointSamples::default() }));
-    assert!(dwells.is_empty() && warnings[0].code == "no-dwells", "{}", dwells.len());
+    assert!(dwells.is_empty() && warnings[0].code == Code::NoDwells, "{}", dwells.len());
 }
 
 #[test]

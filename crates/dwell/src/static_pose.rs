@@ -1,7 +1,7 @@
 //! The mean pose of a body that should stand still: the table, the robot's base.
 
 use armcal_core::robust::{MAD_TO_SIGMA, median};
-use armcal_core::{Pose, PoseSamples, Severity, Stage, Warning};
+use armcal_core::{Code, Pose, PoseSamples, Severity, Stage, Warning};
 use nalgebra::{Matrix3, Translation3, UnitQuaternion, Vector3};
 
 use crate::DwellError;
@@ -57,7 +57,7 @@ pub fn mean_pose(samples: &PoseSamples) -> Result<(MeanPose, Vec<Warning>), Dwel
     let subject = if samples.body.is_empty() { "static body" } else { samples.body.as_str() };
     let mut warnings = Vec::new();
     let mut say = |message| {
-        warnings.push(Warning::new(Severity::Inadequate, Stage::Dwell, "body-moved", subject, message));
+        warnings.push(Warning::new(Severity::Inadequate, Stage::Dwell, Code::BodyMoved, subject, message));
     };
     if let Some(change) = Change::of(&samples.time_ns, &samples.position_m, MOTION_FLOOR_M) {
         say(change.in_words(&|m| format!("{:.2} mm", m * 1e3)));

@@ -2,7 +2,7 @@
 
 use crate::error::HeldOutError;
 use armcal_config::{FramePose, Pipeline, TipMount};
-use armcal_core::{Parameter, Pose, Role, Severity, Stage, Warning};
+use armcal_core::{Code, Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::{EffectSpec, Family, Model, Session, catalogue};
 use armcal_result::{StoredArms, StoredModel, StoredResultError};
 use armcal_stages::Placed;
@@ -92,7 +92,7 @@ fn tip_overruled(then: &StoredArms, pipeline: &Pipeline, model: &Model) -> Optio
         apart_m * 1e3
     );
     let differs = declared && apart_m > 1e-9;
-    differs.then(|| Warning::new(Severity::Notice, Stage::Calibrate, "tip-kept", "tip", message))
+    differs.then(|| Warning::new(Severity::Notice, Stage::Calibrate, Code::TipKept, "tip", message))
 }
 
 /// Whether an effect holds beyond the recordings it was fitted on; what time does to it is doubtful.
@@ -107,13 +107,13 @@ pub fn is_lasting(spec: &EffectSpec, warnings: &mut Vec<Warning>) -> bool {
         ));
     };
     if spec.since.is_some() {
-        say("event-not-carried-over", "happened in a recording of the calibration: left out here");
+        say(Code::EventNotCarriedOver, "happened in a recording of the calibration: left out here");
         return false;
     }
     let family = catalogue().iter().find(|kind| kind.name == spec.kind).map(|kind| kind.family);
     if family == Some(Family::Drift) {
         say(
-            "drift-extrapolated",
+            Code::DriftExtrapolated,
             "was fitted over the time of the calibration and is extrapolated to this one",
         );
     }

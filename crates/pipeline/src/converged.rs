@@ -4,7 +4,7 @@ use crate::diagnosed::{run_diagnosis, set_diagnosis};
 use crate::refits::sized_by_refits;
 use armcal_calibrate::Calibration;
 use armcal_config::Pipeline;
-use armcal_core::{Observation, Rejection, SetupReport, Severity, Stage, Warning};
+use armcal_core::{Code, Observation, Rejection, SetupReport, Severity, Stage, Warning};
 use armcal_diagnose::{Diagnosis, Knowledge, Verdict};
 use armcal_model::{Model, Session};
 use armcal_recording::Recording;
@@ -252,7 +252,7 @@ fn closing_warnings(rounds: usize, at_table: bool, calibration: &Calibration) ->
         warnings.push(Warning::new(
             Severity::Inadequate,
             Stage::Table,
-            "association-unsettled",
+            Code::AssociationUnsettled,
             "association",
             format!(
                 "after {MAX_ROUNDS} rounds of fitting and associating, dwells still change cavities; \
@@ -265,7 +265,7 @@ fn closing_warnings(rounds: usize, at_table: bool, calibration: &Calibration) ->
 }
 
 /// Code of the warning about a fit that does not generalise.
-pub(crate) const HOLDOUT_WORSE: &str = "holdout-worse";
+pub(crate) const HOLDOUT_WORSE: Code = Code::HoldoutWorse;
 
 pub(crate) fn holdout_worse(calibration: &Calibration) -> Option<Warning> {
     let fitted_mm = calibration.holdout.fitted.mean_m * 1e3;

@@ -1,13 +1,13 @@
 //! What is missing in the model of a run, looked for where the pipeline wants to know: whatever comes of it, the calibration stands.
 
 use armcal_config::Pipeline;
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 use armcal_diagnose::{Calibrated, Diagnosis, Nested, diagnose, nested_validation};
 use armcal_result::{Run, Undiagnosed};
 use armcal_stages::{RunError, Steps};
 
 /// Code of the warning about a diagnosis that could not be made.
-pub(crate) const DIAGNOSIS_FAILED: &str = "diagnosis-failed";
+pub(crate) const DIAGNOSIS_FAILED: Code = Code::DiagnosisFailed;
 
 /// Looks for the effect that the model of a run is missing, if the pipeline wants to know.
 pub(crate) fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) {

@@ -3,7 +3,7 @@
 use crate::diagnosed::{chosen_again, diagnosis_input};
 use armcal_calibrate::{calibrate_beside, holdout_turns};
 use armcal_config::Pipeline;
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 use armcal_diagnose::{Calibrated, Diagnosis, ParameterReport};
 use armcal_model::EffectSpec;
 use armcal_result::{Refit, Run};
@@ -134,7 +134,7 @@ fn cumulative_refits(
                 let message =
                     format!("the model with it cannot be fitted on this hold-out, so it is not shown: {e}");
                 let name = found[count - 1].to_string();
-                let code = "step-not-fitted";
+                let code = Code::StepNotFitted;
                 warnings.push(Warning::new(Severity::Notice, Stage::Calibrate, code, name, message));
                 break;
             }

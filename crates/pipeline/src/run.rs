@@ -29,7 +29,7 @@ pub fn recalibrate(
 ) -> Result<(), RunError> {
     run.model = with_effects(pipeline, geometry, effects, &run.observations)?;
     run.calibration = calibrate(&run.model, &run.observations, &pipeline.fit, &pipeline.holdout)?;
-    run.warnings.retain(|w| ![HOLDOUT_WORSE, DIAGNOSIS_FAILED].contains(&&*w.code));
+    run.warnings.retain(|w| ![HOLDOUT_WORSE, DIAGNOSIS_FAILED].contains(&w.code));
     run.warnings.extend(holdout_worse(&run.calibration));
     if run.setup.mistakes().next().is_none() {
         diagnose_again(run, pipeline, progress);

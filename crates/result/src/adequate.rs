@@ -4,22 +4,19 @@
 //! (`[accuracy] wanted_mm`), and where nothing is, of whether what lies beyond the noise is understood.
 
 use crate::run::Run;
-use armcal_calibrate::{ABOVE_FLOOR, ABOVE_NOISE, OUTLIERS};
-use armcal_core::{Severity, Stage, Warning};
-use armcal_diagnose::UNEXPLAINED;
+use armcal_core::{Code, Severity, Stage, Warning};
 
-/// Code of the warning about errors above what is wanted.
-const ABOVE_WANTED: &str = "errors-above-wanted";
 /// Codes of the warnings about the size of errors.
-const OF_SIZE: [&str; 4] = [ABOVE_FLOOR, ABOVE_NOISE, OUTLIERS, UNEXPLAINED];
+const OF_SIZE: [Code; 4] =
+    [Code::ErrorsAboveFloor, Code::ResidualsAboveNoise, Code::Outliers, Code::Unexplained];
 
 /// The warnings of a run, those about the size of its errors as grave as its user has it.
 pub fn as_wanted(run: &Run, mut warnings: Vec<Warning>) -> Vec<Warning> {
     // How far above the floor, the diagnosis tells with the places.
     let diagnosed = run.diagnosis.is_some();
-    warnings.retain(|w| w.code != ABOVE_FLOOR || !diagnosed);
-    let decides = |code: &str| run.wanted_mm.is_none() && (!diagnosed || code == UNEXPLAINED);
-    for warning in warnings.iter_mut().filter(|w| OF_SIZE.contains(&&*w.code) && !decides(&w.code)) {
+    warnings.retain(|w| w.code != Code::ErrorsAboveFloor || !diagnosed);
+    let decides = |code: Code| run.wanted_mm.is_none() && (!diagnosed || code == Code::Unexplained);
+    for warning in warnings.iter_mut().filter(|w| OF_SIZE.contains(&w.code) && !decides(w.code)) {
         warning.severity = Severity::Notice;
     }
     warnings.extend(above_wanted(run));
@@ -32,6 +29,12 @@ fn above_wanted(run: &Run) -> Option<Warning> {
     let message =
         format!("the mean {of} error of {error_mm:.3} mm is above the {wanted_mm} mm that are wanted");
     (error_mm > wanted_mm).then(|| {
-        Warning::new(Severity::Inadequate, Stage::Calibrate, ABOVE_WANTED, "[accuracy] wanted_mm", message)
+        Warning::new(
+            Severity::Inadequate,
+            Stage::Calibrate,
+            Code::ErrorsAboveWanted,
+            "[accuracy] wanted_mm",
+            message,
+        )
     })
 }

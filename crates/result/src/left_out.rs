@@ -1,7 +1,7 @@
 //! What armcal wrote into a recording, and what of it is left out of the next one.
 
 use crate::{RecordingRun, Run};
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 
 /// Beginning of every topic, attachment name and metadata name of armcal's own.
 pub const PREFIX: &str = "/armcal/";
@@ -21,7 +21,7 @@ pub fn earlier_results(run: &Run) -> Vec<Warning> {
                 if count == 1 { ("message", "is a result") } else { ("messages", "are results") };
             let message =
                 format!("{count} {messages} under {PREFIX} {are} of an earlier run, left out of run.mcap");
-            Warning::new(Severity::Notice, Stage::Output, "earlier-results-left-out", &r.name, message)
+            Warning::new(Severity::Notice, Stage::Output, Code::EarlierResultsLeftOut, &r.name, message)
         })
     };
     run.recordings.iter().filter_map(of_recording).collect()

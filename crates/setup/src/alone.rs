@@ -5,7 +5,7 @@ use super::trial::{Misfit, compute_misfit, for_trials};
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
 use armcal_config::FramePose;
 use armcal_core::units::format_mm;
-use armcal_core::{Certainty, Pose, SetupFinding};
+use armcal_core::{Certainty, Code, Pose, SetupFinding};
 use armcal_stages::{Fitted, Inputs};
 use rayon::prelude::*;
 
@@ -37,7 +37,7 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
     let before_m = together.calibration.judged().fitted.mean_m;
     let names = [&inputs.seen[k].name, &inputs.seen[k + 1].name];
     Some(SetupFinding {
-        code: "frame-moved".into(),
+        code: Code::FrameMoved,
         subject: format!("recordings `{}` and `{}`", names[0], names[1]),
         message: format!(
             "each recording fits by itself (mean error {} mm), all together leave {} mm: between `{}` and `{}` the \

@@ -3,7 +3,7 @@
 use super::hypotheses::{Freedom, Hypothesis, Number};
 use super::trial::{Misfit, compute_misfit};
 use super::weigh::{SAME_FACTOR, could_explain};
-use armcal_core::Observation;
+use armcal_core::{Code, Observation};
 use armcal_stages::{Fitted, Inputs, Rounds, fit_places};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -37,7 +37,7 @@ pub fn fit_hypotheses(now: &Inputs, before: &Misfit, all: Vec<Hypothesis>) -> Ve
 fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
     let of_number = |t: &Tried| t.hypothesis.number.is_some();
     let name = |t: &Tried| (t.hypothesis.code, t.hypothesis.subject.clone());
-    let mut numbers: Vec<(&'static str, String)> = tried.iter().filter(|t| of_number(t)).map(name).collect();
+    let mut numbers: Vec<(Code, String)> = tried.iter().filter(|t| of_number(t)).map(name).collect();
     numbers.dedup();
     for number in numbers {
         let own = |t: &Tried| of_number(t) && name(t) == number;

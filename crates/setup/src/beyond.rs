@@ -4,7 +4,7 @@ use super::attempt::Tried;
 use super::hypotheses::{Freedom, Hypothesis};
 use super::trial::{Misfit, compute_misfit};
 use super::weigh::{EXPLAINED, WORTH_LOOKING};
-use armcal_core::Pose;
+use armcal_core::{Code, Pose};
 use armcal_model::{EffectSpec, EffectTable};
 use armcal_stages::{Fitted, Inputs};
 use rayon::prelude::*;
@@ -47,10 +47,10 @@ impl<'a> Physics<'a> {
                 t.hypothesis.number.as_ref().is_none_or(|n| (n.value - n.nothing).abs() >= n.far)
             }
             Freedom::Frame => self.fitted.is_none_or(|before| match t.hypothesis.code {
-                "recordings-disagree" => {
+                Code::RecordingsDisagree => {
                     t.misfit.times_floor() < WORTH_LOOKING && !self.one_effect_explains(&t.hypothesis)
                 }
-                "target-offset" => before.calibration.times_floor() > EXPLAINED,
+                Code::TargetOffset => before.calibration.times_floor() > EXPLAINED,
                 code => {
                     let by = frame_displacement(self.now, code, before, &t.fitted);
                     by.is_none_or(|(m, rad)| m > FAR_M || rad > FAR_RAD) && !self.one_recording_differs()
@@ -99,13 +99,13 @@ pub fn pose_distance(a: &Pose, b: &Pose) -> (f64, f64) {
 
 /// How far the frame that a hypothesis estimates moves from one fit to the other [m], [rad]; the furthest over the
 /// recordings. None where it is not about a frame.
-pub fn frame_displacement(now: &Inputs, code: &str, from: &Fitted, to: &Fitted) -> Option<(f64, f64)> {
+pub fn frame_displacement(now: &Inputs, code: Code, from: &Fitted, to: &Fitted) -> Option<(f64, f64)> {
     let (a, b) = (&from.model, &to.model);
     let (p, q) = (from.calibration.fit.values(), to.calibration.fit.values());
     match code {
-        "base-frame" => Some(pose_distance(&a.base_in_world(&p), &b.base_in_world(&q))),
-        "tool-frame" => Some(pose_distance(&a.tip_in_last_link(&p), &b.tip_in_last_link(&q))),
-        "board-pose" => {
+        Code::BaseFrame => Some(pose_distance(&a.base_in_world(&p), &b.base_in_world(&q))),
+        Code::ToolFrame => Some(pose_distance(&a.tip_in_last_link(&p), &b.tip_in_last_link(&q))),
+        Code::BoardPose => {
             let of = |r: usize| Some(pose_distance(&a.board_in_world(&p, r)?, &b.board_in_world(&q, r)?));
             (0..now.seen.len()).filter_map(of).reduce(|x, y| (x.0.max(y.0), x.1.max(y.1)))
         }

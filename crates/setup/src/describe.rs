@@ -92,7 +92,7 @@ pub fn setup_finding(
     let ends = moved
         .unwrap_or_else(|| after.fitted.map_or(String::new(), |f| describe_estimates(h, &f.calibration)));
     SetupFinding {
-        code: h.code.into(),
+        code: h.code,
         subject: h.subject.clone(),
         message: format!("with {together}{or} {gain}{ends}; {}", h.remedy),
         certainty: Certainty::Mistake,

@@ -15,7 +15,7 @@ pub fn untestable_sign(inputs: &Inputs, now: &Misfit) -> Option<Unseen> {
     let misfit = compute_misfit(&undone, &undone.fit().ok()?);
     let same = misfit.used == now.used && (misfit.log - now.log).abs() < SAME_FACTOR.ln();
     same.then(|| Unseen {
-        code: hypothesis.code.into(),
+        code: hypothesis.code,
         message: format!(
             "with {} the mean error would be {} mm instead of {}: these data cannot show whether its sign is right, nor calibrate \
              what it turns; turn it by hand and compare",

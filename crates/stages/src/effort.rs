@@ -1,7 +1,7 @@
 //! Joints whose effort is measured in some dwells only: what follows it cannot be told in the others.
 
 use crate::seen::RecordingData;
-use armcal_core::{Dwell, Severity, Stage, Warning, list_names};
+use armcal_core::{Code, Dwell, Severity, Stage, Warning, list_names};
 use std::collections::BTreeMap;
 
 /// Says of each recording which joints have dwells without a measured effort, where any joint of any recording has one at all.
@@ -29,5 +29,5 @@ fn gap_warning(without: usize, dwells: usize, joints: &[String]) -> Warning {
          such dwells"
     );
     let subject = format!("effort of {}", list_names(joints));
-    Warning::new(Severity::Notice, Stage::Dwell, "effort-incomplete", subject, said)
+    Warning::new(Severity::Notice, Stage::Dwell, Code::EffortIncomplete, subject, said)
 }

@@ -8,7 +8,7 @@ use armcal_config::{
     BoardPose, ConfigError, FrameSection, MarkerSection, MarkersOn, ModelSection, Pipeline, TableSection,
     Vertical, pose_knowledge,
 };
-use armcal_core::{Observation, Pose, Severity, Stage, Warning, list_names};
+use armcal_core::{Code, Observation, Pose, Severity, Stage, Warning, list_names};
 use armcal_model::{
     Arm, ArmFrames, Chain, EffectSpec, Frame, Frames, Knowledge, Marker, Model, RecordingStart, Session,
 };
@@ -75,7 +75,7 @@ pub fn links_without_mass(pipeline: &Pipeline, chain: &Chain) -> Option<Warning>
     };
     let said = format!("the URDF gives it no mass, {then}. Write its <inertial>");
     let warning =
-        |subject| Warning::new(Severity::Notice, Stage::Calibrate, "link-without-mass", subject, said);
+        |subject| Warning::new(Severity::Notice, Stage::Calibrate, Code::LinkWithoutMass, subject, said);
     (!links.is_empty()).then(|| warning(format!("link {}", list_names(&links))))
 }
 

@@ -11,7 +11,7 @@ use crate::seen::RecordingData;
 use armcal_calibrate::{Calibration, align_frames, expected_norm_m, fit_frames, position_covariance_m2};
 use armcal_config::{Measure, MeasureKind, Pipeline};
 use armcal_core::{
-    Against, Dwell, DwellId, FeatureId, Observation, Reference, Rejection, Severity, Stage, Warning,
+    Against, Code, Dwell, DwellId, FeatureId, Observation, Reference, Rejection, Severity, Stage, Warning,
 };
 use armcal_model::Model;
 use nalgebra::Matrix3;
@@ -181,7 +181,7 @@ impl<'a> Measures<'a> {
             least_m * 1e3
         );
         let notice =
-            || Warning::new(Severity::Notice, Stage::Calibrate, "tips-open", "closed_chain", message);
+            || Warning::new(Severity::Notice, Stage::Calibrate, Code::TipsOpen, "closed_chain", message);
         (count > 0).then(notice)
     }
 

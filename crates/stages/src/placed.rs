@@ -3,7 +3,7 @@
 use crate::RunError;
 use armcal_calibrate::fit_frames_from;
 use armcal_config::{Pipeline, TipMount};
-use armcal_core::{Observation, Parameter, Pose, Role, Severity, Stage, Warning};
+use armcal_core::{Code, Observation, Parameter, Pose, Role, Severity, Stage, Warning};
 use armcal_model::Model;
 use nalgebra::Vector3;
 
@@ -80,18 +80,18 @@ fn frames_of(model: &Model, chosen: &dyn Fn(&Parameter) -> bool) -> Vec<String> 
     names
 }
 
-fn calibration_notice(code: &'static str, subject: String, message: &str) -> Warning {
+fn calibration_notice(code: Code, subject: String, message: &str) -> Warning {
     Warning::new(Severity::Notice, Stage::Calibrate, code, subject, message.to_owned())
 }
 
 fn frames_fitted(frames: &[String]) -> Warning {
     let message = "nobody knows this beforehand: fitted to the dwells that are judged, for the nominal and the calibrated \
                    arm alike; the arms themselves are left alone";
-    calibration_notice("frame-fitted-on-verification", frames.join(", "), message)
+    calibration_notice(Code::FrameFittedOnVerification, frames.join(", "), message)
 }
 
 fn tip_kept() -> Warning {
     let message = "as the calibration recordings gave it, to the nominal and to the calibrated arm; if tool or target were \
                    mounted anew since, set tip = \"remounted\" in [verify]";
-    calibration_notice("tip-kept", "tip".to_owned(), message)
+    calibration_notice(Code::TipKept, "tip".to_owned(), message)
 }

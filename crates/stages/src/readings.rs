@@ -1,7 +1,7 @@
 //! What the joints' readings look like by themselves, before any model: leaps, zeros, readings without scatter.
 
 use armcal_core::robust::median;
-use armcal_core::{Dwell, JointSamples, Severity, Stage, Warning};
+use armcal_core::{Code, Dwell, JointSamples, Severity, Stage, Warning};
 
 /// No joint turns by this much from one reading to the next [rad].
 pub const LEAP_RAD: f64 = 0.3;
@@ -114,7 +114,7 @@ pub fn leap_warnings(joints: &JointSamples, recording: &str) -> Vec<Warning> {
                 leaps.len()
             );
             let subject = format!("recording `{recording}`");
-            Warning::new(Severity::Notice, Stage::Recording, "joint-jump", subject, message)
+            Warning::new(Severity::Notice, Stage::Recording, Code::JointJump, subject, message)
         })
         .collect()
 }
@@ -151,7 +151,7 @@ pub fn stale_warning(joints: &JointSamples, recording: &str) -> Option<Warning> 
             largest.to_degrees()
         );
         let subject = format!("recording `{recording}`");
-        Warning::new(Severity::Notice, Stage::Recording, "stale-readings", subject, message)
+        Warning::new(Severity::Notice, Stage::Recording, Code::StaleReadings, subject, message)
     })
 }
 
@@ -197,7 +197,7 @@ mod tests {
         let moving: Vec<f64> = (0..3000).map(|i| (0.02 * f64::from(i)).sin()).collect();
         let held: Vec<f64> = (0..3000).map(|i| moving[i / 100 * 100]).collect();
         let found = stale_warning(&stream(vec![held]), "a").expect("it is stale");
-        assert_eq!(found.code, "stale-readings");
+        assert_eq!(found.code, Code::StaleReadings);
         assert!(stale_warning(&stream(vec![moving]), "a").is_none());
         // Rests of 1 s between moves of 1 s, a step of 0.03 rad from reading to reading.
         let rests = (0..3000).map(|i: i32| 0.03 * f64::from(i / 200 * 100 + (i % 200).min(100))).collect();

@@ -6,7 +6,7 @@
 //! loose is for the diagnosis.
 
 use armcal_core::robust::{MAD_TO_SIGMA, median};
-use armcal_core::{Dwell, FeatureId, Severity, Stage, TipMeasurement, Warning};
+use armcal_core::{Code, Dwell, FeatureId, Severity, Stage, TipMeasurement, Warning};
 use armcal_model::Model;
 use std::collections::BTreeMap;
 
@@ -131,7 +131,7 @@ fn rejection_warning(name: &str, own: &[usize], dwells: &[Dwell]) -> Warning {
          knock; what else was seen then is used",
         dwell_list(own.iter().map(|at| dwells[*at].id.dwell))
     );
-    Warning::new(Severity::Notice, Stage::Dwell, "marker-rejected", format!("marker {name}"), message)
+    Warning::new(Severity::Notice, Stage::Dwell, Code::MarkerRejected, format!("marker {name}"), message)
 }
 
 fn told_apart([a, b]: [&str; 2], own: &[(usize, f64)], dwells: &[Dwell]) -> Warning {
@@ -142,7 +142,13 @@ fn told_apart([a, b]: [&str; 2], own: &[(usize, f64)], dwells: &[Dwell]) -> Warn
         most_m * 1e3,
         dwell_list(own.iter().map(|(at, _)| dwells[*at].id.dwell))
     );
-    Warning::new(Severity::Notice, Stage::Dwell, "marker-distance", format!("markers {a} and {b}"), message)
+    Warning::new(
+        Severity::Notice,
+        Stage::Dwell,
+        Code::MarkerDistance,
+        format!("markers {a} and {b}"),
+        message,
+    )
 }
 
 fn dwell_list(dwells: impl Iterator<Item = usize>) -> String {
@@ -228,7 +234,7 @@ mod tests {
         knock(&mut all, "a", 19..20);
         let before = all.clone();
         let said = reject_outliers(&arm(&names), &mut all);
-        let told: Vec<(&str, &str)> = said.iter().map(|w| (&*w.code, w.subject.as_str())).collect();
+        let told: Vec<(&str, &str)> = said.iter().map(|w| (w.code.as_str(), w.subject.as_str())).collect();
         assert_eq!(told, [("marker-rejected", "marker a"), ("marker-rejected", "marker b")]);
         assert!(said[1].message.starts_with("rejected in dwell 7:"), "{}", said[1].message);
         assert!(
@@ -244,7 +250,7 @@ mod tests {
         knock(&mut all, "a", 7..8);
         let before = all.clone();
         let said = reject_outliers(&arm(&names), &mut all);
-        assert_eq!((said.len(), &*said[0].code), (1, "marker-distance"));
+        assert_eq!((said.len(), said[0].code.as_str()), (1, "marker-distance"));
         assert!(
             said[0].subject == "markers tip and a" && said[0].message.contains("in dwell 7:"),
             "{said:?}"

@@ -15,6 +15,7 @@ mod story;
 mod text;
 mod told_warning;
 mod two_arms;
+mod warnings_page;
 
 pub use answer::{Answer, answer};
 pub use drivers::{channel_told, driver_told};
@@ -33,3 +34,4 @@ pub use text::{
 };
 pub use told_warning::{ToldWarning, gravest_first};
 pub use two_arms::{errors_are, joined_tips_text, scale_step};
+pub use warnings_page::warnings_page;

@@ -38,16 +38,10 @@ fn addition_step(called: &Called, d: &Diagnosis) -> Option<String> {
     }
     let (before, after) = (d.holdout_mm.before, d.holdout_mm.after);
     let error = d.judged.words();
-    let does = match d.warnings.iter().any(|w| w.code == "judged-by-fit") {
-        true => format!(
-            "the fitted points err less; the mean {error} error, {before:.3} and {after:.3} mm, does not change clear of chance"
-        ),
-        false => format!("the mean {error} error goes from {before:.3} to {after:.3} mm"),
-    };
     // `armcal add` reads the recordings of a pipeline; a pool has none.
     let adds = match called.is_pool {
         true => "with it under `[[effects]]` of the pipeline, pooled again",
         false => "`armcal add suggested PIPELINE` adds it to the model",
     };
-    Some(format!("{adds}: {does}"))
+    Some(format!("{adds}: the mean {error} error goes from {before:.3} to {after:.3} mm"))
 }

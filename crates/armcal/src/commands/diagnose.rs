@@ -4,7 +4,7 @@ use super::{Outcome, print, terminal_style};
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_config::Pipeline;
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 use armcal_report::{concluded_text, diagnosis_text, stored_diagnosis, summary_json};
 use armcal_result::{Conclusions, Status, StoredRun};
 use std::path::Path;
@@ -30,7 +30,7 @@ pub fn run(input: &Path, json: bool) -> Result<Outcome, Error> {
             crate::stdout::print_warnings(&[Warning::new(
                 lost,
                 Stage::Recording,
-                "recording-damaged",
+                Code::RecordingDamaged,
                 subject,
                 why,
             )]);

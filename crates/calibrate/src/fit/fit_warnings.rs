@@ -2,7 +2,7 @@
 
 use crate::objective::whitened::Whitened;
 use crate::outcome::{Calibration, Fit, Status};
-use armcal_core::{Severity, Stage, Warning, list_names};
+use armcal_core::{Code, Severity, Stage, Warning, list_names};
 
 /// Weight below which an observation is named as an outlier.
 const OUTLIER_WEIGHT: f64 = 0.25;
@@ -11,12 +11,6 @@ const LARGE_SCALE: f64 = 1.5;
 /// Times the floor, or the declared scatter, above which the model that was fitted cannot be called adequate, whatever is
 /// known about the cause.
 pub const INADEQUATE: f64 = 2.0;
-/// Code of the warning about residuals that scatter more than declared.
-pub const ABOVE_NOISE: &str = "residuals-above-noise";
-/// Code of the warning about a mean error above the floor.
-pub const ABOVE_FLOOR: &str = "errors-above-floor";
-/// Code of the warning about observations that weigh little.
-pub const OUTLIERS: &str = "outliers";
 /// Share of outliers from which on they are no exceptions.
 const INADEQUATE_OUTLIERS: f64 = 0.25;
 
@@ -33,7 +27,7 @@ pub(crate) fn of_fit(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
             white.blocks(),
             white.axes.len()
         );
-        add(Severity::Inadequate, "too-few-dwells", "fit", message);
+        add(Severity::Inadequate, Code::TooFewDwells, "fit", message);
     }
     if fit.status == Status::IterationLimit {
         let message = format!(
@@ -41,7 +35,7 @@ pub(crate) fn of_fit(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
              start values",
             fit.iterations
         );
-        add(Severity::Inadequate, "not-converged", "fit", message);
+        add(Severity::Inadequate, Code::NotConverged, "fit", message);
     }
     if let Some(paper) = fit.paper.filter(|paper| !paper.feasible) {
         let k = white.blocks() as f64;
@@ -53,14 +47,14 @@ pub(crate) fn of_fit(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
             paper.limit_m * 1e3,
             paper.limit_m * 1e3 / k,
         );
-        add(Severity::Inadequate, "paper-infeasible", "fit", message);
+        add(Severity::Inadequate, Code::PaperInfeasible, "fit", message);
     }
     let at_bound: Vec<String> =
         fit.estimates.iter().filter(|e| e.at_bound).map(|e| e.parameter.name.clone()).collect();
     if !at_bound.is_empty() {
         let message =
             "on the bound: the true value may lie outside, or a missing effect pulls there".to_string();
-        add(Severity::Notice, "at-bound", &list_names(&at_bound), message);
+        add(Severity::Notice, Code::AtBound, &list_names(&at_bound), message);
     }
     if fit.sigma_scale > LARGE_SCALE {
         let message = format!(
@@ -70,7 +64,7 @@ pub(crate) fn of_fit(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         );
         let inadequate = fit.sigma_scale > INADEQUATE;
         let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
-        add(severity, ABOVE_NOISE, "fit", message);
+        add(severity, Code::ResidualsAboveNoise, "fit", message);
     }
     let blocks = white.problem.block_of_each();
     let outliers = blocks.into_iter().zip(&fit.weights).filter(|(_, weight)| **weight < OUTLIER_WEIGHT);
@@ -86,7 +80,7 @@ pub(crate) fn of_fit(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
         let severity = if many { Severity::Inadequate } else { Severity::Notice };
         // Several observations of one dwell have one name.
         outliers.dedup();
-        add(severity, OUTLIERS, &list_names(&outliers), message);
+        add(severity, Code::Outliers, &list_names(&outliers), message);
     }
     warnings
 }
@@ -94,7 +88,7 @@ pub(crate) fn of_fit(fit: &Fit, white: &Whitened<'_>) -> Vec<Warning> {
 /// That the mean error is above the floor by so much that the model is inadequate; none where the scatter has said it.
 pub(crate) fn above_floor(calibration: &Calibration) -> Option<Warning> {
     let times = calibration.left_over();
-    let said = |w: &Warning| w.code == ABOVE_NOISE && w.severity == Severity::Inadequate;
+    let said = |w: &Warning| w.code == Code::ResidualsAboveNoise && w.severity == Severity::Inadequate;
     if !times.is_finite() || times <= INADEQUATE || calibration.warnings.iter().any(said) {
         return None;
     }
@@ -105,5 +99,5 @@ pub(crate) fn above_floor(calibration: &Calibration) -> Option<Warning> {
         calibration.times_floor(),
         calibration.noise_floor_m * 1e3
     );
-    Some(Warning::new(Severity::Inadequate, Stage::Calibrate, ABOVE_FLOOR, "fit", message))
+    Some(Warning::new(Severity::Inadequate, Stage::Calibrate, Code::ErrorsAboveFloor, "fit", message))
 }

@@ -20,7 +20,7 @@ use crate::objective::with_priors::WithPriors;
 use crate::outcome::Estimate;
 use crate::precision::statistics::posterior_covariance;
 use crate::{CalibrateError, FitConfig, Objective};
-use armcal_core::{Parameter, ParameterKind, Severity, Stage, Warning};
+use armcal_core::{Code, Parameter, ParameterKind, Severity, Stage, Warning};
 use std::collections::BTreeMap;
 
 /// Rounds of fit and scale.
@@ -150,7 +150,7 @@ pub(crate) fn learnt_notice(white: &Whitened<'_>) -> Option<Warning> {
     );
     let subject = "priors".to_owned();
     (!kinds.is_empty())
-        .then(|| Warning::new(Severity::Notice, Stage::Calibrate, "priors-learnt", subject, message))
+        .then(|| Warning::new(Severity::Notice, Stage::Calibrate, Code::PriorsLearnt, subject, message))
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use crate::objective::robust::proposal2_scale;
 use crate::objective::whitened::Whitened;
 use crate::objective::with_priors::WithPriors;
 use crate::{CalibrateError, FitConfig};
-use armcal_core::{Parameter, Severity, Stage, Warning, list_names};
+use armcal_core::{Code, Parameter, Severity, Stage, Warning, list_names};
 
 /// How much further than assumed an arm may be from nominal.
 const WIDER: f64 = 1.5;
@@ -78,6 +78,6 @@ pub(crate) fn widened_notice(
         list_names(&all)
     );
     (!all.is_empty()).then(|| {
-        Warning::new(Severity::Notice, Stage::Calibrate, "bound-widened", "bounds".to_owned(), message)
+        Warning::new(Severity::Notice, Stage::Calibrate, Code::BoundWidened, "bounds".to_owned(), message)
     })
 }

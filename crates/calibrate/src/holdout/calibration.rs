@@ -26,7 +26,7 @@ use crate::objective::poses::measured_together;
 use crate::objective::remembered::{Looked, evaluate_problem, keeps_derivative};
 use crate::outcome::{Calibration, Fit, Residual, SideErrors};
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective};
-use armcal_core::{ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
+use armcal_core::{Code, ErrorStats, Observation, Parameter, Role, Severity, Stage, Warning};
 use armcal_model::{Model, ModelResidual};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -365,7 +365,7 @@ fn fitted_on_held_out(unseen: &[String]) -> Warning {
     let message = "no training dwell shows this frame: it alone was fitted on the held-out dwells, with everything else \
                    as the training left it"
         .to_string();
-    Warning::new(Severity::Notice, Stage::Calibrate, "frame-fitted-on-holdout", unseen.join(", "), message)
+    Warning::new(Severity::Notice, Stage::Calibrate, Code::FrameFittedOnHoldout, unseen.join(", "), message)
 }
 
 fn side_errors(residuals: &[&Residual]) -> SideErrors {

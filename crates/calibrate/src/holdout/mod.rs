@@ -4,7 +4,7 @@ pub(crate) mod calibration;
 
 use crate::objective::poses::{Sets, each_pose_pair, pose_groups};
 use crate::{CalibrateError, HoldoutConfig, RecordingKey};
-use armcal_core::{DwellId, Observation, Severity, Stage, Warning};
+use armcal_core::{Code, DwellId, Observation, Severity, Stage, Warning};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The hold-out of a calibration.
@@ -84,7 +84,7 @@ fn poses_on_both_sides(turns: &[Vec<usize>], observations: &[Observation]) -> Op
          the pose is repeated, not how well other poses are predicted; hold out whole poses (`cavity-folds`, `random`) for that"
     );
     (parted > 0)
-        .then(|| Warning::new(Severity::Notice, Stage::Calibrate, "pose-on-both-sides", "hold-out", message))
+        .then(|| Warning::new(Severity::Notice, Stage::Calibrate, Code::PoseOnBothSides, "hold-out", message))
 }
 
 /// These observations and all others of their poses.

@@ -1,7 +1,7 @@
 use super::rig;
 use crate::fit;
 use crate::{CalibrateError, Calibration, FitConfig, HoldoutConfig, calibrate};
-use armcal_core::{DwellId, Observation, Pose, Reference};
+use armcal_core::{Code, DwellId, Observation, Pose, Reference};
 use armcal_model::{Frame, Model};
 use nalgebra::Vector3;
 use proptest::prelude::*;
@@ -170,10 +170,10 @@ fn what_a_turn_leaves_out_it_is_less_certain_of() {
 #[test]
 fn errors_above_twice_the_floor_are_inadequate_whatever_the_scatter_says() {
     let (model, observations) = tracked();
-    let grave = |observations: &[Observation]| -> (Vec<std::borrow::Cow<'static, str>>, Calibration) {
+    let grave = |observations: &[Observation]| -> (Vec<Code>, Calibration) {
         let c = run(&model, observations, "kind = \"cavity-folds\"\nk = 8").unwrap();
         let grave = c.warnings.iter().filter(|w| w.severity == armcal_core::Severity::Inadequate);
-        (grave.map(|w| w.code.clone()).collect(), c)
+        (grave.map(|w| w.code).collect(), c)
     };
     assert!(grave(&observations).0.is_empty());
     let erring = |from: usize, by_m: f64| {
@@ -188,12 +188,12 @@ fn errors_above_twice_the_floor_are_inadequate_whatever_the_scatter_says() {
     };
     let (codes, few) = grave(&erring(70, 40.0 * rig::SIGMA_M));
     assert!(few.fit.sigma_scale < crate::INADEQUATE && few.times_floor() > 2.5, "{}", few.times_floor());
-    assert_eq!(codes, [crate::ABOVE_FLOOR]);
+    assert_eq!(codes, [Code::ErrorsAboveFloor]);
     let mut sharper = observations.clone();
     sharper.iter_mut().for_each(|o| o.covariance_m2 /= 9.0);
     let (codes, all) = grave(&sharper);
     assert!(all.fit.sigma_scale > crate::INADEQUATE && all.times_floor() > 2.5, "{}", all.times_floor());
-    assert_eq!(codes, ["residuals-above-noise"]);
+    assert_eq!(codes, [Code::ResidualsAboveNoise]);
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn a_recording_held_out_gets_its_own_board_and_nothing_else() {
     let c = run(&model, &observations, "kind = \"recordings\"\nrecordings = [\"roll\"]").unwrap();
     assert_eq!(c.holdout.fitted.n, 33);
     assert!(c.holdout.fitted.mean_m < 1.2 * c.noise_floor_m, "{}", c.holdout.fitted.mean_m);
-    let warning = c.warnings.iter().find(|w| w.code == "frame-fitted-on-holdout").unwrap();
+    let warning = c.warnings.iter().find(|w| w.code == Code::FrameFittedOnHoldout).unwrap();
     assert_eq!(warning.subject, "board.roll");
     let roll = c.fit.estimates.iter().find(|e| e.parameter.name == "board.roll.x").unwrap();
     assert!((roll.value - 0.5).abs() < 0.05 && roll.sigma > 0.0);
@@ -266,7 +266,7 @@ fn stands(dwell: usize, joint_rad: Vec<f64>, cavity: Option<usize>) -> Observati
 fn turns(holdout: &str, observations: &[Observation]) -> (Vec<Vec<usize>>, usize) {
     let config: HoldoutConfig = toml::from_str(holdout).unwrap();
     let found = crate::holdout::resolve(&config, observations, &[]).unwrap();
-    let warned = found.warnings.iter().filter(|w| w.code == "pose-on-both-sides").count();
+    let warned = found.warnings.iter().filter(|w| w.code == Code::PoseOnBothSides).count();
     (found.turns, warned)
 }
 

@@ -1,7 +1,7 @@
 use crate::fit_problem;
 use crate::objective::problem::Problem;
 use crate::{FitConfig, Objective, Scale, Status};
-use armcal_core::{Parameter, Role, Unit};
+use armcal_core::{Code, Parameter, Role, Unit};
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt as _;
 
@@ -119,7 +119,7 @@ fn an_active_bound_is_met_exactly_and_the_others_adjust() {
     assert_eq!(fit.estimates[3].value, 0.25);
     assert!(fit.estimates[3].at_bound && !fit.estimates[0].at_bound);
     assert!(fit.estimates[3].ci95[1] <= 0.25);
-    assert!(fit.warnings.iter().any(|w| w.code == "at-bound" && w.subject.contains("p3")));
+    assert!(fit.warnings.iter().any(|w| w.code == Code::AtBound && w.subject.contains("p3")));
     // The other three solve the problem in which p3 is fixed at 0.25.
     let mut fixed = random_problem(2);
     fixed.parameters[3].free = false;

@@ -4,7 +4,7 @@ use super::rig;
 use crate::fit;
 use crate::objective::problem::Problem as _;
 use crate::{FitConfig, HoldoutConfig, ModelProblem, align_frames, calibrate, fit_frames, holdout_turns};
-use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
+use armcal_core::{Code, DwellId, FeatureId, Observation, Pose, Reference};
 use armcal_model::{Chain, Frame, Frames, Marker, Model};
 use nalgebra::{DMatrix, Matrix3xX, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -167,7 +167,7 @@ fn a_pose_is_held_out_whole_and_weighs_as_one() {
         assert!(pose.iter().all(|w| *w == pose[0]), "{pose:?}");
     }
     assert!(calibration.fit.weights[at] < 0.1, "{}", calibration.fit.weights[at]);
-    let outliers = calibration.warnings.iter().find(|w| w.code == "outliers").unwrap();
+    let outliers = calibration.warnings.iter().find(|w| w.code == Code::Outliers).unwrap();
     assert_eq!(outliers.subject, observations[at].dwell.to_string());
     assert!(outliers.message.starts_with("3 of 120 observations"), "{}", outliers.message);
 }

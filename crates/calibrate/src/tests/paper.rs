@@ -3,6 +3,7 @@ use super::rig;
 use crate::fit;
 use crate::fit_problem;
 use crate::{FitConfig, Objective, Status};
+use armcal_core::Code;
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt as _;
 
@@ -55,7 +56,7 @@ fn an_average_accuracy_out_of_reach_is_said_with_its_numbers() {
     for (asked_mm, feasible) in [(mean_mm * 1.001, true), (mean_mm * 0.999, false)] {
         let fit = fit_problem(&problem, &[0.0; 3], &|p| p.free, &config(Some(asked_mm))).unwrap();
         assert_eq!(fit.paper.unwrap().feasible, feasible, "{asked_mm}");
-        let warning = fit.warnings.iter().find(|w| w.code == "paper-infeasible");
+        let warning = fit.warnings.iter().find(|w| w.code == Code::PaperInfeasible);
         assert_eq!(warning.is_some(), !feasible);
         if let Some(warning) = warning {
             assert!(warning.message.contains(&format!("mean {mean_mm:.3} mm")), "{}", warning.message);

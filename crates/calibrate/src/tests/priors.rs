@@ -7,7 +7,7 @@ use crate::fit::priors::scales_of;
 use crate::fit_problem;
 use crate::objective::problem::{Linearised, Problem};
 use crate::{FitConfig, Objective, Scale};
-use armcal_core::{Parameter, ParameterKind, Role, Unit};
+use armcal_core::{Code, Parameter, ParameterKind, Role, Unit};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -148,7 +148,8 @@ fn from_above_priors_are_learnt_alike_wherever_they_begin() {
             assert!((begun / alone - 1.0).abs() < 0.02, "{begun} and {alone}");
             assert!((a.value - b.value).abs() < 0.01 * a.sigma, "{}", a.parameter.name);
         }
-        let codes = [&alone, &begun].map(|fit| fit.warnings.iter().map(|w| &*w.code).collect::<Vec<_>>());
+        let codes =
+            [&alone, &begun].map(|fit| fit.warnings.iter().map(|w| w.code.as_str()).collect::<Vec<_>>());
         assert_eq!(codes[0], codes[1]);
         assert!(codes[0].contains(&"priors-learnt"), "{codes:?}");
     }
@@ -166,7 +167,7 @@ fn bounds_that_nobody_declared_are_widened_where_that_explains_the_errors() {
             all.parameters.iter_mut().for_each(|p| p.assumed = None);
         }
         let fit = fit_problem(&all, &[0.0; 30], &|p| p.free, &config()).unwrap();
-        let said = fit.warnings.iter().find(|w| w.code == "bound-widened").map(|w| w.message.clone());
+        let said = fit.warnings.iter().find(|w| w.code == Code::BoundWidened).map(|w| w.message.clone());
         (fit.estimates[0].value, fit.estimates[0].parameter.upper, said)
     };
     let (value, upper, said) = outcome(6e-3, 0.0, false);
@@ -196,7 +197,7 @@ fn what_is_declared_is_kept() {
 fn what_was_learnt_is_said() {
     let problem = problem(&[(ParameterKind::JointZero, 1e-3)], 6, 5);
     let fit = fit_problem(&problem, &[0.0; 6], &|p| p.free, &config()).unwrap();
-    let said = fit.warnings.iter().find(|w| w.code == "priors-learnt").unwrap();
+    let said = fit.warnings.iter().find(|w| w.code == Code::PriorsLearnt).unwrap();
     let mm = 1e3 * fit.estimates[0].parameter.prior_sigma.unwrap();
     assert!(said.message.contains(&format!("joint zeros {mm:.2} mm")), "{}", said.message);
     assert!(fit.estimates.iter().all(|e| e.determined), "the data know each of them");

@@ -3,7 +3,7 @@ use super::rig;
 use crate::fit;
 use crate::fit_problem;
 use crate::{CalibrateError, FitConfig, HoldoutConfig, Objective, calibrate};
-use armcal_core::{Observation, Reference};
+use armcal_core::{Code, Observation, Reference};
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 fn good() -> (armcal_model::Model, Vec<Observation>) {
@@ -66,7 +66,7 @@ fn a_fit_that_nobody_waits_for_is_stopped() {
 fn too_few_dwells_are_said_with_numbers() {
     let (model, observations) = good();
     let fit = fit(&model, &observations[..4], &FitConfig::default()).unwrap();
-    let warning = fit.warnings.iter().find(|w| w.code == "too-few-dwells").unwrap();
+    let warning = fit.warnings.iter().find(|w| w.code == Code::TooFewDwells).unwrap();
     assert!(
         warning.message.starts_with("12 equations from 4 dwells for 16 free parameters"),
         "{}",

@@ -1,7 +1,7 @@
 use super::rig;
 use crate::fit;
 use crate::{Fit, FitConfig, Objective};
-use armcal_core::{Observation, Reference};
+use armcal_core::{Code, Observation, Reference};
 use nalgebra::Vector3;
 
 fn shifted(observations: &[Observation], every: usize, by_m: f64) -> Vec<Observation> {
@@ -45,7 +45,7 @@ fn five_percent_of_outliers_do_not_move_the_answer() {
     for (j, weight) in with.weights.iter().enumerate() {
         assert_eq!(*weight < 0.05, j % 20 == 0, "observation {j}: {weight}");
     }
-    assert!(with.warnings.iter().any(|w| w.code == "outliers" && w.message.starts_with("10 ")));
+    assert!(with.warnings.iter().any(|w| w.code == Code::Outliers && w.message.starts_with("10 ")));
 }
 
 #[test]

@@ -93,7 +93,7 @@ pub fn answer_recorded(scenario: &Scenario) -> Result<(Answer, Vec<Hidden>), Sco
     let pipeline = Pipeline::load(&place.pipeline)?;
     let settled = armcal_pipeline::settle(&pipeline, &Silent)?;
     if let Some(mistake) = settled.setup.mistakes().next() {
-        let told = answer_of_mistake(&mistake.code, &settled.fitted.calibration);
+        let told = answer_of_mistake(mistake.code.as_str(), &settled.fitted.calibration);
         return Ok((told, read_truth(&place.truth)?.hidden));
     }
     let begin = std::time::Instant::now();

@@ -1,7 +1,7 @@
 //! What the user knows of an arm: effects that cannot act there, the only ones that can, and those that do.
 
 use crate::{DiagnoseError, DiagnosisConfig};
-use armcal_core::{Severity, Stage, Warning, list_names};
+use armcal_core::{Code, Severity, Stage, Warning, list_names};
 use armcal_model::EffectSpec;
 use std::collections::BTreeMap;
 
@@ -64,7 +64,7 @@ impl Knowledge {
             said.push(format!("{} held", list_names(held)));
         }
         let message = format!("as the pipeline says: {}", said.join("; "));
-        let notice = Warning::new(Severity::Notice, Stage::Diagnose, "not-tried", "diagnosis", message);
+        let notice = Warning::new(Severity::Notice, Stage::Diagnose, Code::NotTried, "diagnosis", message);
         (!said.is_empty()).then_some(notice)
     }
 }

@@ -12,7 +12,7 @@ use crate::weigh::scatter::IMPROBABLE;
 use armcal_calibrate::tails::ln_f_tail;
 use armcal_calibrate::{BLURRED, ImpliedError, PositionNoise, implied_joint_errors};
 use armcal_core::robust::median;
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 use armcal_model::EffectSpec;
 
 /// The shape of an effect that says how much of its gap a joint rests in.
@@ -51,7 +51,7 @@ impl Diagnosis {
             refitted.calibration.noise_floor_m * 1e3,
             found.calibration.noise_floor_m * 1e3
         );
-        let warnings = vec![Warning::new(Severity::Notice, Stage::Diagnose, "rests-in-play", new, message)];
+        let warnings = vec![Warning::new(Severity::Notice, Stage::Diagnose, Code::RestsInPlay, new, message)];
         Refitted { warnings, ..refitted }
     }
 

@@ -8,7 +8,7 @@ use crate::diagnose_problem;
 use crate::diagnosis::{UnknownReport, Verdict::*};
 use crate::tests::{planar_arm, planted, quick, scatter};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
-use armcal_core::{Arrival, DwellId, ErrorStats, Reference, Unit};
+use armcal_core::{Arrival, Code, DwellId, ErrorStats, Reference, Unit};
 use armcal_model::EffectSpec;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::OnceLock;
@@ -112,7 +112,13 @@ fn concluded_of(
         effects: vec![EffectSpec::parse("backlash:1", &names).unwrap()],
         model: planar_arm(),
         calibration,
-        warnings: vec![Warning::new(Severity::Notice, Stage::Diagnose, "of-refit", "x", "y".to_owned())],
+        warnings: vec![Warning::new(
+            Severity::Notice,
+            Stage::Diagnose,
+            Code::NotConverged,
+            "x",
+            "y".to_owned(),
+        )],
     });
     let evidence = Evidence { before, observations, refitted, joint_names: &names };
     d.conclude(evidence, &quick());
@@ -126,8 +132,8 @@ fn codes(d: &Diagnosis) -> Vec<&str> {
 fn codes_of(warnings: &[Warning]) -> Vec<&str> {
     warnings
         .iter()
-        .map(|w| &*w.code)
-        .filter(|c| ["unexplained", "holdout-errs-more", "of-refit"].contains(c))
+        .map(|w| w.code.as_str())
+        .filter(|c| ["unexplained", "holdout-errs-more", "not-converged"].contains(c))
         .collect()
 }
 
@@ -163,7 +169,7 @@ fn scatter_beyond_what_is_declared_is_not_nothing() {
         c.fit.sigma_scale = scale;
         let d = concluded(found(NothingMissing), &c, None);
         assert_eq!(d.verdict, verdict);
-        let severity = d.warnings.iter().find(|w| w.code == "unexplained").map(|w| w.severity);
+        let severity = d.warnings.iter().find(|w| w.code == Code::Unexplained).map(|w| w.severity);
         // At the floor, a scale is no failure of the calibration.
         assert_eq!(severity, (verdict == Unexplained).then_some(Severity::Notice));
     }
@@ -189,7 +195,7 @@ fn a_name_stays_that_a_refit_confirms() {
     );
     assert!(near(d.holdout_mm.before, 3.0) && near(d.holdout_mm.after, 1.0) && d.unexplained.is_none());
     assert!(d.refitted.is_some() && d.effects.len() == 1);
-    assert_eq!(codes(&d), ["of-refit"]);
+    assert_eq!(codes(&d), ["not-converged"]);
 }
 
 #[test]
@@ -217,13 +223,13 @@ fn how_much_a_name_explains_is_a_figure_beside_it_and_half_of_it_is_enough() {
         let beside = d.unexplained.as_ref().unwrap();
         assert!(near(beside.times_floor, after_mm) && near(beside.error_mm, after_mm));
         assert!(near(beside.explained_share, share) && beside.repeatability_mm.is_none());
-        let warning = d.warnings.iter().find(|w| w.code == "unexplained");
+        let warning = d.warnings.iter().find(|w| w.code == Code::Unexplained);
         assert_eq!(warning.is_some(), share < 0.5);
         assert!(warning.is_none_or(|w| w.severity == Severity::Inadequate));
         assert!(warning.is_none_or(|w| w.message.starts_with("beside what is named, the mean")));
     }
     let d = concluded(found(Identified), &erring(3.0, 3.0), Some(erring(1.45, 1.45)));
-    assert!(d.unexplained.is_none() && codes(&d) == ["of-refit"], "within 1.5 times the floor");
+    assert!(d.unexplained.is_none() && codes(&d) == ["not-converged"], "within 1.5 times the floor");
 }
 
 #[test]
@@ -245,7 +251,7 @@ fn noise_declared_smaller_changes_what_remains_and_no_name() {
     let left = smaller.unexplained.unwrap();
     // 1.2 mm of a floor of 0.1; of 16 - 0.01 above it 16 - 1.44 are explained.
     assert!(near(left.times_floor, 12.0) && near(left.explained_share, 14.56 / 15.99), "{left:?}");
-    assert_eq!(codes_of(&smaller.warnings), ["of-refit"], "half of it and more is explained");
+    assert_eq!(codes_of(&smaller.warnings), ["not-converged"], "half of it and more is explained");
     let nothing = concluded(found(NothingMissing), &declared(0.1, erring(1.2, 1.2)), None);
     assert_eq!(nothing.verdict, Unexplained, "without a name it is not nothing");
 }
@@ -296,7 +302,7 @@ fn how_well_poses_repeat_is_told_beside_what_remains() {
 fn a_hold_out_that_errs_more_with_a_name_is_told_and_takes_no_name() {
     let d = concluded(found(Identified), &erring(1.6, 3.0), Some(erring(2.4, 1.0)));
     assert_eq!((d.verdict, d.names.len()), (Identified, 1));
-    let told = d.warnings.iter().find(|w| w.code == "holdout-errs-more").unwrap();
+    let told = d.warnings.iter().find(|w| w.code == Code::HoldoutErrsMore).unwrap();
     assert_eq!((told.severity, told.subject.as_str()), (Severity::Notice, "backlash:1"));
     assert!(!told.message.contains("  "), "{}", told.message);
     // Neither what errs less nor what was not held out.
@@ -365,7 +371,7 @@ fn the_place_of_unexplained_errors_is_told_and_looked_at_first() {
     let tail = "; visits to a place err alike (correlation 0.50): seats and cavities off their place do that; 0 listed effects and 77 unlisted shapes were tried, and none \
                 predicts it clear of chance";
     assert!(unexplained.sentence().ends_with(tail), "{}", unexplained.sentence());
-    let warning = d.warnings.iter().find(|w| w.code == "unexplained").unwrap();
+    let warning = d.warnings.iter().find(|w| w.code == Code::Unexplained).unwrap();
     assert_eq!((warning.severity, &warning.message), (Severity::Inadequate, &unexplained.sentence()));
     assert!(
         d.record_next[0]

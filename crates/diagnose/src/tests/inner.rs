@@ -32,7 +32,7 @@ fn searched(p: &Problem) -> Search {
 }
 
 fn codes(all: &[Warning]) -> Vec<&str> {
-    all.iter().map(|w| &*w.code).collect()
+    all.iter().map(|w| w.code.as_str()).collect()
 }
 
 fn assembled(p: &Problem, search: &Search) -> Diagnosis {

@@ -9,7 +9,7 @@ use crate::verdict::next::prepend_findings;
 use armcal_calibrate::{
     Calibration, DwellError, compare_heldout, error_places, repeatability_m, single_dwells,
 };
-use armcal_core::{Observation, Severity, Stage, Warning, list_names};
+use armcal_core::{Code, Observation, Severity, Stage, Warning, list_names};
 
 /// Standard deviation of the norm of an isotropic Gaussian error over its mean, `sqrt(3 pi / 8 - 1)` (Maxwell).
 const SPREAD_OF_NORM: f64 = 0.422;
@@ -157,7 +157,7 @@ fn errs_more(
     );
     let subject = names.join(" + ");
     held.harms()
-        .then(|| Warning::new(Severity::Notice, Stage::Diagnose, "holdout-errs-more", subject, message))
+        .then(|| Warning::new(Severity::Notice, Stage::Diagnose, Code::HoldoutErrsMore, subject, message))
 }
 
 #[cfg(test)]

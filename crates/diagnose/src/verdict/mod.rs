@@ -29,7 +29,7 @@ use crate::verdict::reports::{candidate_reports, not_testable, parameter_reports
 use crate::weigh::Weighed;
 use crate::weigh::crossval::{by_place, errors_m, left_out};
 use crate::weigh::scatter::Scatter;
-use armcal_core::{DwellId, Severity, Stage, Warning, list_names};
+use armcal_core::{Code, DwellId, Severity, Stage, Warning, list_names};
 use armcal_model::Toggle;
 use nalgebra::DVector;
 use std::collections::BTreeSet;
@@ -91,7 +91,7 @@ fn not_evaluated(dropped: &BTreeSet<String>) -> Option<Warning> {
         list_names(&names)
     );
     let notice =
-        || Warning::new(Severity::Notice, Stage::Diagnose, "not-evaluated", list_names(&names), message);
+        || Warning::new(Severity::Notice, Stage::Diagnose, Code::NotEvaluated, list_names(&names), message);
     (!names.is_empty()).then(notice)
 }
 
@@ -283,11 +283,11 @@ fn warnings(
             names.len(),
             config.outlier_sigma
         );
-        add("suspect-dwell", list_names(&names), message);
+        add(Code::SuspectDwell, list_names(&names), message);
     }
     if noise.sigma_ratio > SIGMA_RATIO {
         add(
-            "scatter-larger",
+            Code::ScatterLarger,
             "noise".to_string(),
             format!(
                 "what remains scatters {:.1} times as much as declared{}; check the declared noise, the seats and the sensor",
@@ -304,11 +304,11 @@ fn warnings(
              below it; declare what the sensor and the seats scatter",
             noise.sigma_ratio
         );
-        add("noise-overdeclared", "noise".to_string(), message);
+        add(Code::NoiseOverdeclared, "noise".to_string(), message);
     }
     if let Some(alike) = noise.alike() {
         let message = format!("{alike}; more repeats of the same kind average less");
-        add("scatter-correlated", "noise".to_string(), message);
+        add(Code::ScatterCorrelated, "noise".to_string(), message);
     }
     let names: Vec<&str> = search.accepted.iter().map(|a| a.candidate.spec.as_str()).collect();
     for of_one in simultaneous_events(&names) {
@@ -316,7 +316,7 @@ fn warnings(
             "{} tell of one moment: one event, such as a collision, a restart or a remounted part, may have done all of it",
             of_one.join(" and ")
         );
-        add("one-event", of_one[0].to_owned(), message);
+        add(Code::OneEvent, of_one[0].to_owned(), message);
     }
     for a in &search.accepted {
         if let Some(reason) = a.candidate.known.as_ref().filter(|_| !a.instead_of.is_empty()) {
@@ -325,7 +325,7 @@ fn warnings(
                 a.candidate.spec,
                 list_names(&a.instead_of)
             );
-            add("named-as-known", a.candidate.spec.clone(), message);
+            add(Code::NamedAsKnown, a.candidate.spec.clone(), message);
         }
         if !a.judged.impossible.is_empty() {
             let message = format!(
@@ -333,7 +333,7 @@ fn warnings(
                 a.candidate.spec,
                 list_names(&a.judged.impossible)
             );
-            add("negative-size", a.candidate.spec.clone(), message);
+            add(Code::NegativeSize, a.candidate.spec.clone(), message);
         }
         if seen_by_the_sensor_alone(a) {
             let message = format!(
@@ -341,7 +341,7 @@ fn warnings(
                  knocked meanwhile displace as much; look at the sensor's own recording of these dwells",
                 a.candidate.spec
             );
-            add("event-or-sensor", a.candidate.spec.clone(), message);
+            add(Code::EventOrSensor, a.candidate.spec.clone(), message);
         }
         if a.candidate.toggle == Toggle::Recording && one_load(&a.conditioned.problem) {
             let message = format!(
@@ -349,7 +349,7 @@ fn warnings(
                  changes them too: check `load_kg`, and that all recordings are of this arm with this tool",
                 a.candidate.spec
             );
-            add("event-or-load", a.candidate.spec.clone(), message);
+            add(Code::EventOrLoad, a.candidate.spec.clone(), message);
         }
         if a.candidate.toggle == Toggle::Direction {
             let wrong = direction_suspects(a);
@@ -361,7 +361,7 @@ fn warnings(
                     wrong.len(),
                     a.candidate.spec
                 );
-                add("suspect-direction", a.candidate.spec.clone(), message);
+                add(Code::SuspectDirection, a.candidate.spec.clone(), message);
             }
         }
     }

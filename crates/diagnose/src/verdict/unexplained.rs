@@ -2,10 +2,8 @@
 
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Tried, Unexplained, Verdict};
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 
-/// Code of the warning about what is neither explained nor of the noise.
-pub const UNEXPLAINED: &str = "unexplained";
 /// Of the squared error beyond the declared noise an adequate model explains at least this share.
 const ADEQUATE_SHARE: f64 = 0.5;
 
@@ -22,7 +20,7 @@ impl Unexplained {
         let severity = if inadequate { Severity::Inadequate } else { Severity::Notice };
         let beside = if alone { "" } else { "beside what is named, " };
         let message = format!("{beside}{}", self.sentence());
-        Some(Warning::new(severity, Stage::Diagnose, UNEXPLAINED, "diagnosis", message))
+        Some(Warning::new(severity, Stage::Diagnose, Code::Unexplained, "diagnosis", message))
     }
 
     /// What the errors are compared with, and beside it how well poses repeat.

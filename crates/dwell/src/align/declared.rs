@@ -1,6 +1,6 @@
 //! Clocks whose relation the pipeline declares: taken as declared, and compared with the motion.
 
-use armcal_core::{JointSamples, PoseSamples, Severity, Warning};
+use armcal_core::{Code, JointSamples, PoseSamples, Severity, Warning};
 
 use super::warnings::clock_warning;
 use super::{NominalArm, SIGMA_FLOOR_S, estimate_alignment};
@@ -41,7 +41,7 @@ pub(super) fn align(
     };
     let unchecked = |why: &DwellError| {
         let message = format!("offset and drift are taken as declared; the motion cannot check them: {why}");
-        clock_warning(Severity::Notice, "clock-unchecked", message)
+        clock_warning(Severity::Notice, Code::ClockUnchecked, message)
     };
     match estimate_alignment(joints, tip, arm, &search) {
         Ok((found, said)) => {
@@ -49,7 +49,7 @@ pub(super) fn align(
             alignment.displacement_ratio = found.displacement_ratio;
             // What is said of an estimate that is not used is no matter.
             let about_the_data =
-                |w: &Warning| ["clock-displacement-ratio", "clock-not-linear"].contains(&&*w.code);
+                |w: &Warning| [Code::ClockDisplacementRatio, Code::ClockNotLinear].contains(&w.code);
             let mut warnings: Vec<Warning> = said.into_iter().filter(about_the_data).collect();
             warnings.extend(contradiction_warning(&alignment, &found, first_ns, last_ns));
             Ok((alignment, warnings))
@@ -68,7 +68,7 @@ pub(super) fn align(
                  clock.offset_ms and which stamps the streams use",
                 declared.offset_s * 1e3
             );
-            Ok((alignment, vec![clock_warning(Severity::Inadequate, "clock-contradicted", message)]))
+            Ok((alignment, vec![clock_warning(Severity::Inadequate, Code::ClockContradicted, message)]))
         }
         Err(why) => Err(why),
     }
@@ -102,5 +102,5 @@ fn contradiction_warning(
         offset_ms(declared),
         by_s * 1e3,
     );
-    Some(clock_warning(Severity::Inadequate, "clock-contradicted", message))
+    Some(clock_warning(Severity::Inadequate, Code::ClockContradicted, message))
 }

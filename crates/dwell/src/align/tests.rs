@@ -1,7 +1,7 @@
 use super::*;
 use crate::KnownClock;
 use crate::testkit::{Formula, Random, Session, WRONG_SIGMA, Wrong, nominal, ns, tip_m};
-use armcal_core::Severity;
+use armcal_core::{Code, Severity};
 use nalgebra::Rotation3;
 
 /// Twenty-five dwells, about a minute and a half, seen by a sensor with noise, offset and drift.
@@ -49,7 +49,7 @@ fn intervals_of_offset_and_drift_hold_the_truth_as_often_as_they_say() {
         let joints = s.encoders(&mut r, 50.0, 2e-5, 0.0);
         let tip = s.tip_of(&mut r, &wrong, 60.0, 1.4e-4, offset_s, drift);
         let (found, warnings) = align(&joints, &tip);
-        assert!(warnings.iter().all(|w| w.code != "clock-not-linear"), "seed {seed}: {warnings:?}");
+        assert!(warnings.iter().all(|w| w.code != Code::ClockNotLinear), "seed {seed}: {warnings:?}");
         let at = |share| pull(&found, &tip, offset_s, drift, share, s.end_s());
         middle += u32::from(at(0.5).abs() < 1.96);
         end += u32::from(at(1.0).abs() < 1.96);
@@ -120,7 +120,7 @@ fn a_clock_set_in_a_long_recording_is_noticed_where_it_was() {
         let set_s = (tip.time_ns[from] - tip.time_ns[0]) as f64 * 1e-9;
         tip.time_ns[from..].iter_mut().for_each(|t| *t += (by_s * 1e9) as i64);
         let (_, warnings) = align(&joints, &tip);
-        let said = warnings.iter().find(|w| w.code == "clock-not-linear").expect("noticed");
+        let said = warnings.iter().find(|w| w.code == Code::ClockNotLinear).expect("noticed");
         let number = |before: &str| -> f64 {
             let after = said.message.split(before).nth(1).and_then(|rest| rest.split(' ').next());
             after.and_then(|word| word.parse().ok()).unwrap_or_else(|| panic!("{}", said.message))
@@ -163,7 +163,7 @@ fn few_movements_are_no_clock_that_was_set() {
         let (joints, tip) =
             (s.encoders(&mut r, 50.0, 2e-5, 0.0), s.tip_of(&mut r, &wrong, 60.0, 1.4e-4, 0.2, 0.0));
         let Ok((_, warnings)) = align_clocks(&joints, &tip, ARM, &ClockConfig::default()) else { continue };
-        assert!(warnings.iter().all(|w| w.code != "clock-not-linear"), "seed {seed}: {warnings:?}");
+        assert!(warnings.iter().all(|w| w.code != Code::ClockNotLinear), "seed {seed}: {warnings:?}");
     }
 }
 
@@ -175,7 +175,7 @@ fn a_drift_beyond_the_limit_is_taken_on_it_and_reported() {
     let (found, warnings) = align_clocks(&joints, &tip, ARM, &config).expect("aligns");
     assert!((found.drift - 2e-4).abs() < 1e-12, "{found:?}");
     assert!(found.drift_sigma > 3e-4, "what the data want is not ruled out: {found:?}");
-    let limited = warnings.iter().find(|w| w.code == "clock-drift-limited").expect("reported");
+    let limited = warnings.iter().find(|w| w.code == Code::ClockDriftLimited).expect("reported");
     assert!(
         limited.severity == Severity::Inadequate && limited.message.contains("+60"),
         "{}",
@@ -197,7 +197,7 @@ fn a_declared_clock_is_taken_and_contradicted_where_the_motion_does() {
     let late = s.tip(&mut r, 100.0, 1e-4, 0.04, 0.0);
     let (found, warnings) = align_clocks(&joints, &late, ARM, &same).expect("as declared");
     assert_eq!(found.to_robot_ns(late.time_ns[7]), late.time_ns[7]);
-    assert!(warnings.len() == 1 && warnings[0].code == "clock-contradicted", "{warnings:?}");
+    assert!(warnings.len() == 1 && warnings[0].code == Code::ClockContradicted, "{warnings:?}");
     assert!(warnings[0].message.contains("+40.0 ±"), "{}", warnings[0].message);
     // The declared offset holds at the sensor's first stamp.
     let drifting = s.tip(&mut r, 100.0, 1e-4, 0.04, 2e-4);
@@ -209,7 +209,7 @@ fn a_declared_clock_is_taken_and_contradicted_where_the_motion_does() {
     // Too little motion to check is a notice, and the recording is kept.
     let still = JointSamples { joint_rad: vec![vec![0.3; joints.len()]; 3], ..joints };
     let (_, warnings) = align_clocks(&still, &tip, ARM, &same).expect("as declared");
-    assert!(warnings.len() == 1 && warnings[0].code == "clock-unchecked", "{warnings:?}");
+    assert!(warnings.len() == 1 && warnings[0].code == Code::ClockUnchecked, "{warnings:?}");
     for bad in [
         ClockConfig { offset_ms: Some(1.0), ..same.clone() },
         ClockConfig { drift_ppm: Some(1.0), ..ClockConfig::default() },
@@ -424,7 +424,7 @@ fn a_clock_set_during_the_recording_is_noticed_with_its_size() {
         let (_, warnings) = align(&joints, &tip);
         let said = warnings
             .iter()
-            .find(|w| w.code == "clock-not-linear")
+            .find(|w| w.code == Code::ClockNotLinear)
             .unwrap_or_else(|| panic!("{seed}: {warnings:?}"));
         let later = if by_s > 0.0 { "later" } else { "earlier" };
         let size_ms: f64 = said
@@ -461,7 +461,7 @@ fn stamps_of_a_recorder_that_stalls_are_not_a_clock_that_was_set() {
         last = *t;
     }
     let (_, warnings) = align(&joints, &tip);
-    for said in warnings.iter().filter(|w| w.code == "clock-not-linear") {
+    for said in warnings.iter().filter(|w| w.code == Code::ClockNotLinear) {
         assert!(said.message.contains("bursts after stalls of up to 0.8 s"), "{}", said.message);
         assert!(!said.message.contains("clock was set"), "{}", said.message);
     }

@@ -1,6 +1,6 @@
 //! What the user should know of an alignment.
 
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 
 use super::coarse::Coarse;
 use super::jump::Jump;
@@ -10,7 +10,7 @@ use crate::ClockAlignment;
 /// A drift beyond the limit by fewer standard errors is one on the limit.
 const BEYOND_SIGMAS: f64 = 3.0;
 
-pub(super) fn clock_warning(severity: Severity, code: &'static str, message: String) -> Warning {
+pub(super) fn clock_warning(severity: Severity, code: Code, message: String) -> Warning {
     Warning::new(severity, Stage::Dwell, code, "clock", message)
 }
 
@@ -31,7 +31,7 @@ impl Streams<'_> {
             );
             let far = !(0.5..=2.0).contains(&found.displacement_ratio);
             let severity = if far { Severity::Inadequate } else { Severity::Notice };
-            warnings.push(clock_warning(severity, "clock-displacement-ratio", message));
+            warnings.push(clock_warning(severity, Code::ClockDisplacementRatio, message));
         }
         if let Some(rival_s) = coarse.rival_s {
             let message = format!(
@@ -40,7 +40,7 @@ impl Streams<'_> {
                 self.config.initial_offset_s + rival_s,
                 found.offset_s
             );
-            warnings.push(clock_warning(Severity::Inadequate, "clock-ambiguous", message));
+            warnings.push(clock_warning(Severity::Inadequate, Code::ClockAmbiguous, message));
         }
         warnings.extend(self.drift_warning(estimate.drift));
         if found.offset_sigma_s > 0.02 {
@@ -48,10 +48,14 @@ impl Streams<'_> {
                 "the offset is known to {:.0} ms only; record more and faster moves",
                 found.offset_sigma_s * 1e3
             );
-            warnings.push(clock_warning(Severity::Notice, "clock-uncertain", message));
+            warnings.push(clock_warning(Severity::Notice, Code::ClockUncertain, message));
         }
         if let Some(jump) = jump {
-            warnings.push(clock_warning(Severity::Inadequate, "clock-not-linear", self.jump_in_words(jump)));
+            warnings.push(clock_warning(
+                Severity::Inadequate,
+                Code::ClockNotLinear,
+                self.jump_in_words(jump),
+            ));
         }
         warnings
     }
@@ -65,7 +69,7 @@ impl Streams<'_> {
                     "the recording is too short to tell the drift better than clock.max_drift_ppm = {most_ppm}; taken as \
                      zero with that standard error"
                 );
-                Some(clock_warning(Severity::Notice, "clock-drift-unknown", message))
+                Some(clock_warning(Severity::Notice, Code::ClockDriftUnknown, message))
             }
             Drift::Limited { wanted, sigma } => {
                 let message = format!(
@@ -76,7 +80,7 @@ impl Streams<'_> {
                 );
                 let beyond = wanted.abs() - self.max_drift() > BEYOND_SIGMAS * sigma;
                 let severity = if beyond { Severity::Inadequate } else { Severity::Notice };
-                Some(clock_warning(severity, "clock-drift-limited", message))
+                Some(clock_warning(severity, Code::ClockDriftLimited, message))
             }
         }
     }

@@ -11,7 +11,7 @@ mod told;
 use crate::error::HeldOutError;
 use crate::stored::place_model;
 use armcal_config::{BoardPose, Pipeline};
-use armcal_core::{Observation, Severity, Warning};
+use armcal_core::{Code, Observation, Severity, Warning};
 use armcal_model::Chain;
 use armcal_result::{Closing, StoredModel, open_model};
 use armcal_result::{PathSample, Verification, VerifiedRecording};
@@ -26,8 +26,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Warnings about a clock that the nominal arm judged.
-const OF_NOMINAL_CLOCK: [&str; 4] =
-    ["clock-not-linear", "clock-uncertain", "clock-drift-unknown", "clock-drift-limited"];
+const OF_NOMINAL_CLOCK: [Code; 4] =
+    [Code::ClockNotLinear, Code::ClockUncertain, Code::ClockDriftUnknown, Code::ClockDriftLimited];
 
 /// Verifies the result of an earlier run on the recordings of a pipeline.
 pub fn verify(
@@ -116,7 +116,7 @@ fn of_recording(seen: &RecordingData) -> Vec<Warning> {
     let named = |w: &Warning| {
         let subject = format!("{}: {}", seen.name, w.subject);
         // Dwell detection knows the nominal arm only, whose errors look like those of a clock.
-        if !OF_NOMINAL_CLOCK.contains(&&*w.code) {
+        if !OF_NOMINAL_CLOCK.contains(&w.code) {
             return Warning { subject, ..w.clone() };
         }
         let message = format!(
@@ -161,7 +161,7 @@ impl Surroundings<'_> {
         }
         let mut observations = self.observations(&places)?;
         let fitted = placed.fit_frames(self.pipeline, &observations)?;
-        if fitted.iter().any(|w| w.code == "frame-fitted-on-verification") {
+        if fitted.iter().any(|w| w.code == Code::FrameFittedOnVerification) {
             places = self.associate(&placed, true)?;
             observations = self.observations(&places)?;
             placed.fit_frames(self.pipeline, &observations)?;

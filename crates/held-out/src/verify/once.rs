@@ -1,7 +1,7 @@
 //! What two of the new recordings both hold counts once.
 
 use armcal_config::Pipeline;
-use armcal_core::{JointSamples, Samples, Severity, Stage, Warning};
+use armcal_core::{Code, JointSamples, Samples, Severity, Stage, Warning};
 use armcal_recording::{Fingerprint, SharedTime};
 use armcal_stages::RecordingData;
 use armcal_stages::preprocess::find_repeats;
@@ -43,7 +43,7 @@ pub fn distinct_recordings(
             all - own.dwells.len()
         );
         let subject = format!("recording `{}`", own.name);
-        warnings.push(Warning::new(Severity::Notice, Stage::Recording, "counted-once", subject, message));
+        warnings.push(Warning::new(Severity::Notice, Stage::Recording, Code::CountedOnce, subject, message));
     }
     let mut pipeline = pipeline.clone();
     // Two rows are the least between which anything moves.

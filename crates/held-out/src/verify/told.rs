@@ -1,6 +1,6 @@
 //! What the result knows of the new recordings, and where they go beyond it.
 
-use armcal_core::{DwellId, Observation, Samples, Severity, Stage, Unit, Visited, Warning};
+use armcal_core::{Code, DwellId, Observation, Samples, Severity, Stage, Unit, Visited, Warning};
 use armcal_model::{Chain, Model, PlacedEffect};
 use armcal_recording::{FileReport, sha256_of};
 use armcal_result::Told;
@@ -39,7 +39,7 @@ pub fn not_held_out(told: &Told) -> Warning {
         "the calibration was made from this recording{part}: its error here says nothing about new ones"
     );
     let subject = format!("recording `{recording}`");
-    Warning::new(Severity::Inadequate, Stage::Recording, "not-held-out", subject, message)
+    Warning::new(Severity::Inadequate, Stage::Recording, Code::NotHeldOut, subject, message)
 }
 
 /// One warning a joint that stands or moves where no dwell of the calibration was near.
@@ -78,7 +78,7 @@ pub fn beyond_calibrated(
         Some(Warning::new(
             Severity::Notice,
             Stage::Calibrate,
-            "beyond-calibrated-range",
+            Code::BeyondCalibratedRange,
             name.clone(),
             message,
         ))
@@ -97,7 +97,7 @@ pub fn effort_unknown(model: &Model, observations: &[Observation]) -> Vec<Warnin
             model.chain().joint_names()[joint],
         );
         let (severity, stage) = (Severity::Notice, Stage::Calibrate);
-        let warning = || Warning::new(severity, stage, "effort-unknown", effect.spec.to_string(), message);
+        let warning = || Warning::new(severity, stage, Code::EffortUnknown, effect.spec.to_string(), message);
         (without > 0).then(warning)
     };
     model.effects().iter().filter_map(of).collect()

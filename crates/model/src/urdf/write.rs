@@ -4,7 +4,7 @@ use super::branches::by_name;
 use super::reader::{Reader, child, parse};
 use crate::chain::Source;
 use crate::{Model, ModelError};
-use armcal_core::{FeatureId, Pose, Severity, Stage, Warning};
+use armcal_core::{Code, FeatureId, Pose, Severity, Stage, Warning};
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 use std::ops::Range;
@@ -101,7 +101,7 @@ fn tip_not_written(joint: &str) -> Warning {
     Warning::new(
         Severity::Notice,
         Stage::Output,
-        "tip-not-in-urdf",
+        Code::TipNotInUrdf,
         "tip",
         format!(
             "the tip link hangs on the moving joint \"{joint}\", so the calibrated tip frame is not in the URDF; \

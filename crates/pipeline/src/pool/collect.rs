@@ -3,7 +3,7 @@
 use super::PoolError;
 use armcal_config::ConfigError;
 use armcal_config::{BoardPose, ClosedChainSection, ClosureKind, FramePose, ObservationsSection, Pipeline};
-use armcal_core::{Against, Dwell, Observation, Pose, Severity, Stage, Warning};
+use armcal_core::{Against, Code, Dwell, Observation, Pose, Severity, Stage, Warning};
 use armcal_recording::RecordingReport;
 use armcal_result::{
     BoardFacts, DwellMark, EarlierResult, OBSERVATIONS_FILE, ObservedRecording, RecordingRun, StartFrame,
@@ -100,7 +100,7 @@ fn assemble_recordings(found: Vec<Found>, warnings: Vec<Warning>) -> Collected {
         let board = board.as_ref().map(StartFrame::pose);
         let earlier = EarlierResult { path: f.result, files, dwells, rejected };
         let lost = lost.into_iter().map(|why| {
-            Warning::new(Severity::DataLost, Stage::Recording, "recording-damaged", name.clone(), why)
+            Warning::new(Severity::DataLost, Stage::Recording, Code::RecordingDamaged, name.clone(), why)
         });
         let warnings = lost.collect();
         collected.recordings.push(CollectedRecording {
@@ -307,7 +307,7 @@ fn counted_once(f: &Found, first: &Found, twice: usize, all: usize) -> Warning {
         first.recording.name,
         first.result.display()
     );
-    Warning::new(Severity::Notice, Stage::Calibrate, "counted-once", f.recording.name.clone(), message)
+    Warning::new(Severity::Notice, Stage::Calibrate, Code::CountedOnce, f.recording.name.clone(), message)
 }
 
 fn left_out(f: &Found) -> Warning {
@@ -319,7 +319,7 @@ fn left_out(f: &Found) -> Warning {
     Warning::new(
         Severity::DataLost,
         Stage::Calibrate,
-        "recording-left-out",
+        Code::RecordingLeftOut,
         f.recording.name.clone(),
         message,
     )

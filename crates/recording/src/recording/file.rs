@@ -10,7 +10,7 @@ use crate::structure::layout::Layout;
 use crate::structure::raw::RawChannel;
 use crate::structure::survey::{FileSurvey, Tally};
 use crate::{Fetched, FileReport, ObjectIdentity, RecordingError, Source};
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -226,8 +226,8 @@ impl RecordingFile {
     pub fn warnings(&self, damage: &[Damage]) -> Vec<Warning> {
         let warn = |d: &Damage| {
             let (severity, code) = match d.lost {
-                true => (Severity::DataLost, "recording-damaged"),
-                false => (Severity::Notice, "recording-irregular"),
+                true => (Severity::DataLost, Code::RecordingDamaged),
+                false => (Severity::Notice, Code::RecordingIrregular),
             };
             let subject = self.path.display().to_string();
             let text = format!("at byte {}: {}", d.offset, d.why);

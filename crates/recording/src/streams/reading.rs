@@ -12,7 +12,7 @@ use crate::{
     Chain, Clock, GaugeStream, JointStream, Occlusion, PoseStream, RecordingError, ScalarStream,
     StreamReport, Streams,
 };
-use armcal_core::{JointSamples, PoseSamples, ScalarSamples, Severity, Stage, Warning};
+use armcal_core::{Code, JointSamples, PoseSamples, ScalarSamples, Severity, Stage, Warning};
 
 /// What is read of one stream; `None` where it holds nothing and that is no error.
 pub(crate) enum Columns {
@@ -115,7 +115,7 @@ impl Reading<'_> {
         let effort_nm = joints::recorded_effort(rows.of_columns(table.effort));
         let time_ns = rows.time_ns;
         self.finish(role, &time_ns, counts)?;
-        self.inadequate("unit-doubtful", joints::looks_like_radians(&joint_rad, stream));
+        self.inadequate(Code::UnitDoubtful, joints::looks_like_radians(&joint_rad, stream));
         self.report.quantisation_rad = joints::quantisation_rad(&joint_rad);
         for (said, arm) in self.warnings.iter_mut().filter_map(|said| Some((said, stream.arm.as_ref()?))) {
             said.subject = format!("{arm}: {}", said.subject);
@@ -145,19 +145,19 @@ impl Reading<'_> {
         let orientation = oriented.then(|| poses::orientations(&table, &rows)).flatten();
         let time_ns = rows.time_ns;
         self.finish(role, &time_ns, counts)?;
-        self.inadequate("unit-doubtful", poses::looks_like_metres(stream, &position_m));
+        self.inadequate(Code::UnitDoubtful, poses::looks_like_metres(stream, &position_m));
         let several = (table.frames.len() > 1).then(|| {
             format!(
                 "poses come in several frames ({:?}) and are read as if they were one: set `frame`",
                 table.frames
             )
         });
-        self.inadequate("several-frames", several);
+        self.inadequate(Code::SeveralFrames, several);
         let unoriented =
             table.seen.iter().filter(|s| !oriented && s.quaternion_xyzw.is_some()).count() as u64;
         let text =
             "rows have a quaternion, but not all of about unit length: the stream is read as positions only";
-        self.counted(Severity::Notice, "orientation-unusable", unoriented, text);
+        self.counted(Severity::Notice, Code::OrientationUnusable, unoriented, text);
         let samples = PoseSamples {
             frame_id: table.frames.first().cloned().unwrap_or_default(),
             body: stream.body.clone().or_else(|| table.bodies.first().cloned()).unwrap_or_default(),
@@ -166,7 +166,7 @@ impl Reading<'_> {
             orientation,
         };
         let Some(chain) = self.chain else { return Ok(samples) };
-        self.say(Severity::Notice, "transform-chain", chain.told());
+        self.say(Severity::Notice, Code::TransformChain, chain.told());
         chain.composed(samples).map_err(|why| RecordingError::NotDecodable {
             role,
             topic: stream.topic.clone(),
@@ -179,7 +179,7 @@ impl Reading<'_> {
         match self.poses(stream) {
             Err(unseen @ RecordingError::NoRows { .. }) => {
                 let text = format!("nothing is known of this marker here: {unseen}");
-                self.say(Severity::DataLost, "marker-unseen", text);
+                self.say(Severity::DataLost, Code::MarkerUnseen, text);
                 Ok(None)
             }
             read => read.map(Some),
@@ -218,14 +218,14 @@ impl Reading<'_> {
                 _ => "",
             };
             let text = format!("{mixed}nothing here depends on temperature: {why}");
-            self.say(Severity::DataLost, "temperature-unusable", text);
+            self.say(Severity::DataLost, Code::TemperatureUnusable, text);
             return Ok(None);
         }
         if scale == Scale::Kelvin {
             let text = "looks like kelvin, every reading being one that no laboratory has in degrees Celsius: converted";
-            self.say(Severity::Notice, "temperature-kelvin", text.to_owned());
+            self.say(Severity::Notice, Code::TemperatureKelvin, text.to_owned());
         } else if let Some(text) = like_fahrenheit(&celsius) {
-            self.say(Severity::Notice, "temperature-fahrenheit", text);
+            self.say(Severity::Notice, Code::TemperatureFahrenheit, text);
         }
         Ok(Some(ScalarSamples { time_ns, value: celsius }))
     }
@@ -263,7 +263,7 @@ impl Reading<'_> {
                 "its messages carry no stamp of their own: {} time is used in its place",
                 clock.word()
             );
-            self.say(Severity::Notice, "no-stamp", text);
+            self.say(Severity::Notice, Code::NoStamp, text);
         }
         let mut time = stamps.on(clock);
         if clock == Clock::Header {
@@ -323,52 +323,52 @@ impl Reading<'_> {
         let note = Severity::Notice;
         self.counted(
             lost,
-            "undecodable",
+            Code::Undecodable,
             r.undecodable,
             &format!("messages could not be decoded, the first because: {first}"),
         );
-        self.counted(lost, "non-finite", r.non_finite, "rows with NaN or infinite values dropped");
+        self.counted(lost, Code::NonFinite, r.non_finite, "rows with NaN or infinite values dropped");
         self.counted(
             lost,
-            "impossible",
+            Code::Impossible,
             r.impossible,
             "rows dropped with values no joint or laboratory can have: look for damage or a faulty driver",
         );
         self.counted(
             lost,
-            "stray-stamps",
+            Code::StrayStamps,
             r.stray_stamps,
             "rows dropped whose header stamp is far from all others: look for damage or a clock that was set",
         );
-        self.counted(lost, "unstamped", r.unstamped, "rows without a stamp dropped");
+        self.counted(lost, Code::Unstamped, r.unstamped, "rows without a stamp dropped");
         self.counted(
             note,
-            "duplicate-stamps",
+            Code::DuplicateStamps,
             r.duplicate_stamps,
             "rows with the stamp of the row before dropped",
         );
         self.counted(
             note,
-            "backward-stamps",
+            Code::BackwardStamps,
             r.backward_stamps,
             "rows with stamps going backwards sorted into place",
         );
         let of_all = format!("of {} poses rejected as occluded", r.messages);
-        self.counted(note, "occluded", r.occluded.total(), &of_all);
-        self.counted(note, "other-joints", r.other_joints, "messages without all wanted joints skipped");
+        self.counted(note, Code::Occluded, r.occluded.total(), &of_all);
+        self.counted(note, Code::OtherJoints, r.other_joints, "messages without all wanted joints skipped");
         for why in &self.gathered.unreadable {
             let text = format!("another channel of this topic is not read: {why}");
             self.warnings.push(Warning::new(
                 note,
                 Stage::Recording,
-                "channel-unreadable",
+                Code::ChannelUnreadable,
                 warning_subject(&r),
                 text,
             ));
         }
     }
 
-    fn counted(&mut self, severity: Severity, code: &'static str, count: u64, what: &str) {
+    fn counted(&mut self, severity: Severity, code: Code, count: u64, what: &str) {
         if count > 0 {
             let text = format!("{count} {what}");
             self.warnings.push(Warning::new(
@@ -381,13 +381,13 @@ impl Reading<'_> {
         }
     }
 
-    fn inadequate(&mut self, code: &'static str, text: Option<String>) {
+    fn inadequate(&mut self, code: Code, text: Option<String>) {
         if let Some(text) = text {
             self.say(Severity::Inadequate, code, text);
         }
     }
 
-    fn say(&mut self, severity: Severity, code: &'static str, text: String) {
+    fn say(&mut self, severity: Severity, code: Code, text: String) {
         self.warnings.push(Warning::new(
             severity,
             Stage::Recording,

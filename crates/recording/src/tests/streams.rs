@@ -7,7 +7,7 @@ use crate::{
     Clock, Encoder, JointStream, JointUnit, LengthUnit, PoseStream, Recording, RecordingError, ScalarStream,
 };
 use crate::{Occlusion, StreamReport, Streams};
-use armcal_core::{Samples, Severity, Warning};
+use armcal_core::{Code, Samples, Severity, Warning};
 use mcap::Compression;
 use proptest::prelude::*;
 
@@ -190,7 +190,7 @@ fn two_schemas_on_a_topic_leave_the_readable_one() {
     let opaque = Track { topic: "/joint_states", ..super::opaque("", 50) };
     let (samples, reports, warnings) = ok(&[opaque, joint_track(moving())], &two_joints());
     assert_eq!((samples.joints.len(), reports[0].messages), (500, 500));
-    assert!(warnings.iter().any(|w| w.code == "channel-unreadable"), "{warnings:?}");
+    assert!(warnings.iter().any(|w| w.code == Code::ChannelUnreadable), "{warnings:?}");
 }
 
 #[test]
@@ -210,7 +210,7 @@ fn bad_rows_are_counted_and_time_comes_out_increasing() {
     assert_eq!((r.duplicate_stamps, r.backward_stamps, r.rows), (1, 1, 498));
     assert!(samples.joints.time_ns.windows(2).all(|w| w[0] < w[1]));
     let lost: Vec<&str> =
-        warnings.iter().filter(|w| w.severity == Severity::DataLost).map(|w| &*w.code).collect();
+        warnings.iter().filter(|w| w.severity == Severity::DataLost).map(|w| w.code.as_str()).collect();
     assert_eq!(lost, ["undecodable", "non-finite"]);
 }
 
@@ -358,7 +358,7 @@ fn markers_are_read_each_under_its_name_and_one_that_is_never_seen_costs_itself(
     assert!(samples.bodies["elbow"].position_m[7].x < 1.5 && samples.tip.is_none());
     let roles: Vec<&str> = reports.iter().map(|r| r.role.as_str()).collect();
     assert_eq!(roles, ["joints", "bodies.elbow", "bodies.hand", "bodies.lost"]);
-    let lost = warnings.iter().find(|w| w.code == "marker-unseen").expect("said");
+    let lost = warnings.iter().find(|w| w.code == Code::MarkerUnseen).expect("said");
     assert!(lost.subject.contains("/lost") && lost.message.contains("100 with NaN"), "{lost:?}");
     assert_eq!(streams.topics(), ["/elbow", "/hand", "/joint_states", "/lost"]);
     let bodies = [("hand".to_owned(), stream("/hands"))];
@@ -387,26 +387,29 @@ fn temperature_is_a_column() {
 
 #[test]
 fn what_no_laboratory_has_is_no_temperature() {
-    let code = |warnings: &[Warning], code: &str| -> Option<Warning> {
+    let code = |warnings: &[Warning], code: Code| -> Option<Warning> {
         warnings.iter().find(|w| w.code == code && w.subject.contains("/cell")).cloned()
     };
     let (samples, reports, warnings) =
         with_thermometer(|i| if i % 3 == 0 { -999.0 } else { 20.0 + i as f64 });
     assert_eq!(samples.temperature.expect("a column").value, [21.0, 22.0, 24.0, 25.0, 27.0, 28.0]);
     assert_eq!((reports[1].rows, reports[1].impossible), (6, 4));
-    assert_eq!(code(&warnings, "impossible").expect("reported").severity, Severity::DataLost);
+    assert_eq!(code(&warnings, Code::Impossible).expect("reported").severity, Severity::DataLost);
     let (samples, _, warnings) = with_thermometer(|i| 293.15 + i as f64);
     assert!((samples.temperature.expect("a column").value[9] - 29.0).abs() < 1e-9);
-    assert!(code(&warnings, "temperature-kelvin").expect("reported").message.contains("converted"));
+    assert!(code(&warnings, Code::TemperatureKelvin).expect("reported").message.contains("converted"));
     // Nothing usable costs the temperature, not the recording.
     for nothing in [|_| f64::NAN, |_| -999.0, |i| if i < 2 { 0.0 } else { 293.0 }] {
         let (samples, _, warnings) = with_thermometer(nothing);
         assert!(samples.temperature.is_none() && samples.joints.len() == 500);
-        assert_eq!(code(&warnings, "temperature-unusable").expect("reported").severity, Severity::DataLost);
+        assert_eq!(
+            code(&warnings, Code::TemperatureUnusable).expect("reported").severity,
+            Severity::DataLost
+        );
     }
     let (samples, _, warnings) = with_thermometer(|i| 68.0 + i as f64);
     assert_eq!(samples.temperature.expect("a column").value[0], 68.0);
-    assert!(code(&warnings, "temperature-fahrenheit").is_some());
+    assert!(code(&warnings, Code::TemperatureFahrenheit).is_some());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::{Style, Track, mcap_bytes, open};
 use crate::ros2::{self, Header};
 use crate::{JointStream, PoseStream, RecordingError, Streams};
-use armcal_core::{PoseSamples, Warning};
+use armcal_core::{Code, PoseSamples, Warning};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 const START_NS: i64 = 1_700_000_000_000_000_000;
@@ -149,7 +149,7 @@ fn poses_over_several_transforms_are_what_scipy_makes_of_them() {
             let wanted = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
             assert!(turned[i].angle_to(&wanted) < 1e-7, "{frame} {i}");
         }
-        let said = warnings.iter().find(|w| w.code == "transform-chain").expect("told");
+        let said = warnings.iter().find(|w| w.code == Code::TransformChain).expect("told");
         assert!(said.message.contains("with the stamps of \"ball\" in \"tracker\" on /tf"), "{said}");
     }
     // One transform, the other way round, is a chain of one; one that is there is read as it was.

@@ -4,7 +4,7 @@ use crate::findings::with_play_found;
 use crate::recording::{get, own, read, string, write};
 use crate::synthetic::{Synthetic, synthetic};
 use armcal_config::InputMessages;
-use armcal_core::{Severity, Stage, Warning};
+use armcal_core::{Code, Severity, Stage, Warning};
 use armcal_report::{Detail, TerminalStyle, report_html, run_text, summary_json};
 use armcal_result::Status;
 use armcal_result::sensitivity::Basis;
@@ -74,7 +74,13 @@ fn people_are_told_names_of_recordings_and_programs_their_indices() {
     let mut s = synthetic();
     let (subject, message) =
         ("recording 0 dwell 5 (cavity a)", "frame_shift@0 and tool_shift@1.4 tell of it");
-    s.run.warnings.push(Warning::new(Severity::Inadequate, Stage::Calibrate, "odd", subject, message));
+    s.run.warnings.push(Warning::new(
+        Severity::Inadequate,
+        Stage::Calibrate,
+        Code::NotConverged,
+        subject,
+        message,
+    ));
     let told = "dwell 5 of `normal` (cavity a): frame_shift in `normal` (frame_shift@0) and tool_shift from dwell 4 of `roll` on \
                 (tool_shift@1.4) tell of it";
     said(&s, "named");
@@ -92,7 +98,7 @@ fn a_lamp_is_green_only_where_the_result_stands() {
     s.run.warnings.push(Warning::new(
         Severity::DataLost,
         Stage::Recording,
-        "lost",
+        Code::RecordingDamaged,
         "normal",
         "a chunk is gone",
     ));

@@ -4,8 +4,8 @@
 use crate::input::input;
 use armcal_calibrate::{Calibration, Estimate, Fit, Residual, SideErrors, Status, UndeterminedDirection};
 use armcal_core::{
-    Arrival, Dwell, DwellId, ErrorStats, Observation, Pose, Reference, Rejection, SetupReport, Severity,
-    Stage, TipMeasurement, Warning,
+    Arrival, Code, Dwell, DwellId, ErrorStats, Observation, Pose, Reference, Rejection, SetupReport,
+    Severity, Stage, TipMeasurement, Warning,
 };
 use armcal_dwell::ClockAlignment;
 use armcal_model::{Chain, Frame, Frames, Model, Session};
@@ -109,7 +109,7 @@ pub fn synthetic() -> Synthetic {
         steps: Vec::new(),
         alternatives: Vec::new(),
         transfer: None,
-        warnings: vec![warning("association-unsettled", "association", "two dwells changed cavities")],
+        warnings: vec![warning(Code::AssociationUnsettled, "association", "two dwells changed cavities")],
     };
     Synthetic { run, recordings, paths, folder }
 }
@@ -201,7 +201,11 @@ fn recording_run(
         rejections,
         earlier: None,
         warnings: match index {
-            1 => vec![warning("gap", "/joint_states", "a gap of 2.1 s; check the network of the robot")],
+            1 => vec![warning(
+                Code::DwellSplitByGap,
+                "/joint_states",
+                "a gap of 2.1 s; check the network of the robot",
+            )],
             _ => Vec::new(),
         },
     };
@@ -367,6 +371,6 @@ fn fit(model: &Model, observations: usize, fitted: &[f64]) -> Fit {
     }
 }
 
-fn warning(code: &'static str, subject: &str, message: &str) -> Warning {
+fn warning(code: Code, subject: &str, message: &str) -> Warning {
     Warning::new(Severity::Notice, Stage::Dwell, code, subject, message)
 }

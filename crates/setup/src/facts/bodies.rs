@@ -2,7 +2,7 @@
 
 use super::{mistake_finding, possible_finding};
 use crate::beyond::pose_distance;
-use armcal_core::{Dwell, SetupFinding};
+use armcal_core::{Code, Dwell, SetupFinding};
 use armcal_dwell::MeanPose;
 use armcal_stages::still::still_tip;
 use armcal_stages::{Inputs, RecordingData};
@@ -36,12 +36,12 @@ pub fn no_quaternion(inputs: &Inputs) -> Vec<SetupFinding> {
             let subject = format!("the {role}");
             match measured(role) {
                 true => mistake_finding(
-                    "quaternion-missing",
+                    Code::QuaternionMissing,
                     subject,
                     format!("{seen}: its quaternion is not filled in; mend what publishes [streams.{role}]"),
                 ),
                 false => possible_finding(
-                    "quaternion-missing",
+                    Code::QuaternionMissing,
                     subject,
                     format!(
                         "{seen}, and its position never varies: it stands so, or what publishes [streams.{role}] does not \
@@ -66,12 +66,12 @@ pub fn swapped_streams(inputs: &Inputs) -> Vec<SetupFinding> {
         };
         let turned_rad = seen.dwells.iter().map(moved).fold(0.0, f64::max);
         if let Some(message) = still_tip(tip_m, turned_rad).filter(|_| tips.len() > 2) {
-            all.push(mistake_finding("streams-swapped", format!("recording `{}`", seen.name), message));
+            all.push(mistake_finding(Code::StreamsSwapped, format!("recording `{}`", seen.name), message));
         }
         for (role, travel_m) in &seen.travels_m {
             if *travel_m > MOVES_M {
                 all.push(mistake_finding(
-                    "streams-swapped",
+                    Code::StreamsSwapped,
                     format!("recording `{}`", seen.name),
                     format!(
                         "the body read as the {role} moved by {:.0} mm while the arm moved: a {role} stands still, so it \
@@ -93,7 +93,7 @@ pub fn same_body(inputs: &Inputs) -> Option<SetupFinding> {
         all.filter(|all| !all.is_empty() && all.iter().all(|(m, rad)| *m < SAME_M && *rad < SAME_RAD))?;
     let apart_mm = all.iter().map(|(m, _)| m * 1e3).fold(0.0, f64::max);
     Some(mistake_finding(
-        "streams-equal",
+        Code::StreamsEqual,
         "base and table".to_owned(),
         format!(
             "the bodies read as base and as table are the same body: their poses differ by {apart_mm:.3} mm at most; mend \

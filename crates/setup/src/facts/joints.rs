@@ -1,7 +1,7 @@
 //! Readings of joints that no encoder gives: stuck, speeds, what was asked for.
 
 use super::{mistake_finding, possible_finding};
-use armcal_core::{Dwell, SetupFinding};
+use armcal_core::{Code, Dwell, SetupFinding};
 use armcal_stages::still::{TURNS_RAD, value_range};
 use armcal_stages::{Inputs, RecordingData};
 
@@ -24,7 +24,7 @@ pub fn speed_readings(inputs: &Inputs) -> Option<SetupFinding> {
     all.then(|| {
         let message = "every joint reads nearly zero most of the time, and not always: these are speeds, or another field than \
                        the angles; mend [streams.joints]";
-        mistake_finding("wrong-field", "the joints".to_owned(), message.to_owned())
+        mistake_finding(Code::WrongField, "the joints".to_owned(), message.to_owned())
     })
 }
 
@@ -42,7 +42,7 @@ pub fn set_points(inputs: &Inputs) -> Option<SetupFinding> {
         read.len() < 2 || steps_of(&read)
     });
     let finding = possible_finding(
-        "setpoints-recorded",
+        Code::SetpointsRecorded,
         "the joints".to_owned(),
         format!(
             "no joint's reading scatters in {} of {dwells} dwells, nor lies on the steps of an encoder, and the errors are above the \
@@ -70,7 +70,7 @@ pub fn wrong_stamps(inputs: &Inputs) -> Vec<SetupFinding> {
     let of = |s: &RecordingData| {
         let why = s.readings.stamps.as_ref()?;
         let message = format!("{why}; mend what stamps them, or set `clock = \"log\"` in [streams.joints]");
-        Some(mistake_finding("stamps-wrong", format!("recording `{}`", s.name), message))
+        Some(mistake_finding(Code::StampsWrong, format!("recording `{}`", s.name), message))
     };
     inputs.seen.iter().filter_map(of).collect()
 }
@@ -83,7 +83,7 @@ pub fn saturated_readings(inputs: &Inputs) -> Vec<SetupFinding> {
         for (end, sign) in [("lowest", -1.0), ("highest", 1.0)] {
             let Some((n, value_rad)) = at_one_end(&read_rad, j, sign) else { continue };
             all.push(possible_finding(
-                "joint-saturated",
+                Code::JointSaturated,
                 format!("joint {} ({name})", j + 1),
                 format!(
                     "joint {} ({name}) reads its {end} value, {:.3} deg, in {n} of {} dwells, while others turn, and no other \
@@ -141,7 +141,7 @@ pub fn stuck_readings(inputs: &Inputs) -> Vec<SetupFinding> {
         let subject = format!("joint {} ({name})", j + 1);
         all.push(match still.iter().any(|d| d.joint_spread_rad.iter().any(|s| *s > EXACT_RAD)) {
             true => mistake_finding(
-                "joint-stuck",
+                Code::JointStuck,
                 subject,
                 format!(
                     "{seen}, without the jitter of their readings: its reading is stuck, or read from the wrong field; mend \
@@ -149,7 +149,7 @@ pub fn stuck_readings(inputs: &Inputs) -> Vec<SetupFinding> {
                 ),
             ),
             false => possible_finding(
-                "joint-stuck",
+                Code::JointStuck,
                 subject,
                 format!(
                     "{seen}: it was not moved, or its reading is stuck or read from the wrong field; these readings have no \

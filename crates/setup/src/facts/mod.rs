@@ -5,7 +5,7 @@
 mod bodies;
 mod joints;
 
-use armcal_core::{Certainty, Observation, Pose, Role, SetupFinding};
+use armcal_core::{Certainty, Code, Observation, Pose, Role, SetupFinding};
 use armcal_stages::{Fitted, Inputs};
 use armcal_table::Tilt;
 use nalgebra::{Matrix3, Vector3};
@@ -84,7 +84,7 @@ fn contradicted_tilts(inputs: &Inputs, fitted: &Fitted) -> Vec<SetupFinding> {
         if apart_rad > TILT_RAD {
             let (a, b) = (&inputs.seen[0].name, &inputs.seen[r].name);
             all.push(mistake_finding(
-                "tilt-declared",
+                Code::TiltDeclared,
                 format!("recording `{b}`"),
                 format!(
                     "between `{a}` and `{b}` the board's normal turned by {:.1} deg where the declared tilts say {:.1} deg, and \
@@ -124,7 +124,7 @@ fn declared_frames(fitted: &Fitted) -> Vec<SetupFinding> {
         if off.abs() > SIGMAS * sigma && off.abs() > OFF && e.parameter.free {
             let unit = e.parameter.unit;
             all.push(possible_finding(
-                "frame-declared",
+                Code::FrameDeclared,
                 e.parameter.name.clone(),
                 format!(
                     "{} ends {:.2} {} from where it was measured, {:.0} times the declared standard error; measure it again, \
@@ -141,11 +141,11 @@ fn declared_frames(fitted: &Fitted) -> Vec<SetupFinding> {
 }
 
 /// What is worth a look; the result may stand.
-fn possible_finding(code: &'static str, subject: String, message: String) -> SetupFinding {
+fn possible_finding(code: Code, subject: String, message: String) -> SetupFinding {
     SetupFinding { certainty: Certainty::Possible, ..mistake_finding(code, subject, message) }
 }
 
-fn mistake_finding(code: &'static str, subject: String, message: String) -> SetupFinding {
+fn mistake_finding(code: Code, subject: String, message: String) -> SetupFinding {
     let certainty = Certainty::Mistake;
     SetupFinding {
         code: code.into(),

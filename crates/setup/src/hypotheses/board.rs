@@ -2,6 +2,7 @@
 
 use super::Hypothesis;
 use armcal_config::{BoardPose, MarkersOn};
+use armcal_core::Code;
 use armcal_stages::Inputs;
 use armcal_table::{Board, Tilt};
 use nalgebra::{Matrix3, Vector3};
@@ -47,7 +48,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             MarkersOn::Frame => (MarkersOn::Board, "the board itself"),
         };
         let change = format!("the table's markers on {words}");
-        all.push(Hypothesis::new("markers-on", "the table", change, MARKERS, move |i| {
+        all.push(Hypothesis::new(Code::MarkersOn, "the table", change, MARKERS, move |i| {
             if let Some(table) = &mut i.pipeline.table {
                 table.markers_on = other;
             }
@@ -64,7 +65,7 @@ pub fn from_the_other_side(inputs: &Inputs) -> Vec<Hypothesis> {
     // One axis of the outline reversed, whatever becomes of the heights: of a board that has none, it is mirrored.
     let outlines = symmetries().into_iter().filter(|(matrix, ..)| matrix.m11 * matrix.m22 < 0.0);
     let mirrored = outlines.filter(|(matrix, ..)| !is_flat || matrix.m33 > 0.0);
-    let of_each = |(matrix, words, code): (Matrix3<f64>, &'static str, &'static str)| {
+    let of_each = |(matrix, words, code): (Matrix3<f64>, &'static str, Code)| {
         let at = move |height_mm: f64| {
             let change = format!("the board {words} and its seats {}", describe_height(height_mm));
             Hypothesis::new(code, "the board", change, FILE, move |i| {
@@ -94,12 +95,12 @@ fn group_of(name: &str) -> &str {
 
 fn scaled_board(scale: f64) -> Hypothesis {
     let change = format!("the board {scale:.4} times as large");
-    Hypothesis::new("board-scale", "the board", change, FILE, move |i| map_cavities(i, |p| scale * p))
+    Hypothesis::new(Code::BoardScale, "the board", change, FILE, move |i| map_cavities(i, |p| scale * p))
 }
 
 fn raised_seats(height_mm: f64) -> Hypothesis {
     let change = format!("seated points {} than drawn", describe_height(height_mm));
-    Hypothesis::new("seat-height", "the board", change, FILE, move |i| {
+    Hypothesis::new(Code::SeatHeight, "the board", change, FILE, move |i| {
         map_cavities(i, |p| p + vertical_shift_m(height_mm));
     })
 }
@@ -107,7 +108,7 @@ fn raised_seats(height_mm: f64) -> Hypothesis {
 fn raised_alone(group: &str, height_mm: f64) -> Hypothesis {
     let (subject, group) = (format!("cavities `{group}…`"), group.to_owned());
     let change = format!("the seats of the {subject} {} than drawn", describe_height(height_mm));
-    Hypothesis::new("seat-height", subject, change, FILE, move |i| {
+    Hypothesis::new(Code::SeatHeight, subject, change, FILE, move |i| {
         let own = i.board.iter_mut().flat_map(|b| &mut b.cavities).filter(|c| group_of(&c.name) == group);
         own.for_each(|c| c.in_board_m += vertical_shift_m(height_mm));
     })
@@ -124,17 +125,17 @@ fn describe_height(height_mm: f64) -> String {
 }
 
 /// Boards that look alike to whoever draws them.
-fn symmetries() -> Vec<(Matrix3<f64>, &'static str, &'static str)> {
+fn symmetries() -> Vec<(Matrix3<f64>, &'static str, Code)> {
     let rows = |a: [f64; 9]| Matrix3::from_row_slice(&a);
     vec![
-        (rows([-1., 0., 0., 0., 1., 0., 0., 0., 1.]), "mirrored (x reversed)", "board-mirrored"),
-        (rows([1., 0., 0., 0., -1., 0., 0., 0., 1.]), "mirrored (y reversed)", "board-mirrored"),
-        (rows([0., 1., 0., 1., 0., 0., 0., 0., 1.]), "with x and y exchanged", "board-mirrored"),
-        (rows([0., -1., 0., 1., 0., 0., 0., 0., 1.]), "turned by 90 deg", "board-turned"),
-        (rows([-1., 0., 0., 0., -1., 0., 0., 0., 1.]), "turned by 180 deg", "board-turned"),
-        (rows([0., 1., 0., -1., 0., 0., 0., 0., 1.]), "turned by 270 deg", "board-turned"),
-        (rows([1., 0., 0., 0., -1., 0., 0., 0., -1.]), "upside down (about x)", "board-turned"),
-        (rows([-1., 0., 0., 0., 1., 0., 0., 0., -1.]), "upside down (about y)", "board-turned"),
+        (rows([-1., 0., 0., 0., 1., 0., 0., 0., 1.]), "mirrored (x reversed)", Code::BoardMirrored),
+        (rows([1., 0., 0., 0., -1., 0., 0., 0., 1.]), "mirrored (y reversed)", Code::BoardMirrored),
+        (rows([0., 1., 0., 1., 0., 0., 0., 0., 1.]), "with x and y exchanged", Code::BoardMirrored),
+        (rows([0., -1., 0., 1., 0., 0., 0., 0., 1.]), "turned by 90 deg", Code::BoardTurned),
+        (rows([-1., 0., 0., 0., -1., 0., 0., 0., 1.]), "turned by 180 deg", Code::BoardTurned),
+        (rows([0., 1., 0., -1., 0., 0., 0., 0., 1.]), "turned by 270 deg", Code::BoardTurned),
+        (rows([1., 0., 0., 0., -1., 0., 0., 0., -1.]), "upside down (about x)", Code::BoardTurned),
+        (rows([-1., 0., 0., 0., 1., 0., 0., 0., -1.]), "upside down (about y)", Code::BoardTurned),
     ]
 }
 
@@ -171,7 +172,7 @@ fn tilt_hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     }
     let new = all.into_iter().filter(|(tilts, _)| *tilts != declared);
     new.map(|(tilts, words)| {
-        Hypothesis::new("tilt-declared", "the board's tilt", words, TILT, move |i| {
+        Hypothesis::new(Code::TiltDeclared, "the board's tilt", words, TILT, move |i| {
             i.pipeline.recordings.iter_mut().zip(&tilts).for_each(|(r, tilt)| r.tilt = *tilt);
         })
     })

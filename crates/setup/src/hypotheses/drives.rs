@@ -5,7 +5,7 @@
 use super::joints::{scale_reading, shift_reading};
 use super::model::{WIDER, widen_bounds};
 use super::{Estimated, Freedom, Hypothesis};
-use armcal_core::{Parameter, Unit};
+use armcal_core::{Code, Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override};
 use armcal_stages::{Change, Inputs};
 use std::collections::BTreeMap;
@@ -39,7 +39,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         for ratio in RATIOS {
             let (set, subject) = (set.clone(), subject.clone());
             let change = format!("the reading of {subject} divided by {ratio}");
-            all.push(Hypothesis::new("joint-scale", subject, change, RATIO, move |i| {
+            all.push(Hypothesis::new(Code::JointScale, subject, change, RATIO, move |i| {
                 i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, 1.0 / ratio)));
             }));
         }
@@ -50,7 +50,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
                 "{} read as its reading {words} that of joint {j} (its reading is coupled)",
                 joint(j)
             );
-            all.push(Hypothesis::new("joint-coupling", joint(j), change, COUPLED, move |i| {
+            all.push(Hypothesis::new(Code::JointCoupling, joint(j), change, COUPLED, move |i| {
                 i.each_dwell(|d| {
                     let before_rad = sign * d.joint_rad[j - 1];
                     shift_reading(d, j, before_rad);
@@ -62,7 +62,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         let change = format!("the gear ratio of {} estimated", joint(j));
         let spec = EffectSpec::new("gear_ratio").at(j);
         let scale = ("scale", bounded_amplitude(RATIO_BOUND));
-        all.push(effect_hypothesis("joint-scale", joint(j), change, RATIO, spec, scale, RATIO_OFF));
+        all.push(effect_hypothesis(Code::JointScale, joint(j), change, RATIO, spec, scale, RATIO_OFF));
     }
     all
 }
@@ -81,7 +81,7 @@ pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
         let subject = armcal_core::list_names(&names);
         let freedom = if set.len() == 1 { Freedom::Number } else { Freedom::Frame };
         let estimated = set.iter().map(|p| Estimated::of(p, FAR_FREED)).collect();
-        let hypothesis = Hypothesis::new("parameter-fixed", subject, change, FIXED, move |i| {
+        let hypothesis = Hypothesis::new(Code::ParameterFixed, subject, change, FIXED, move |i| {
             i.changes.extend(names.iter().map(|name| Change::freed(name, FREED)));
         });
         all.push(hypothesis.estimating(freedom, estimated));
@@ -89,7 +89,7 @@ pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
     if inputs.pipeline.parameters.iter().any(|p| p.free == Some(false)) {
         let estimated = parameters.iter().map(|p| Estimated::of(p, FAR_FREED)).collect();
         let change = "all that is held fixed by the pipeline's [[parameters]] estimated";
-        let hypothesis = Hypothesis::new("parameter-fixed", "the model", change, FREE, |i| {
+        let hypothesis = Hypothesis::new(Code::ParameterFixed, "the model", change, FREE, |i| {
             i.pipeline.parameters.retain(|p| p.free != Some(false));
         });
         all.push(hypothesis.estimating(Freedom::Frame, estimated));
@@ -101,7 +101,7 @@ pub fn let_go(inputs: &Inputs) -> Vec<Hypothesis> {
     if !estimated.is_empty() {
         let names: Vec<String> = estimated.iter().map(|own| own.parameter.clone()).collect();
         let change = format!("the priors and bounds of the model's parameters {WIDER} times as wide");
-        let hypothesis = Hypothesis::new("parameter-bound", "the model", change, PRIORS, move |i| {
+        let hypothesis = Hypothesis::new(Code::ParameterBound, "the model", change, PRIORS, move |i| {
             i.changes.extend(names.iter().map(|name| widen_bounds(name)));
         });
         all.push(hypothesis.estimating(Freedom::Frame, estimated));
@@ -116,7 +116,7 @@ pub fn bounded_amplitude(bound: f64) -> Override {
 
 /// An effect of the catalogue whose one amplitude may be far larger than its physics allows.
 pub fn effect_hypothesis(
-    code: &'static str,
+    code: Code,
     subject: String,
     change: String,
     remedy: &'static str,

@@ -2,6 +2,7 @@
 
 use super::{Freedom, Hypothesis};
 use armcal_config::{BoardPose, FramePose};
+use armcal_core::Code;
 use armcal_stages::Inputs;
 
 const FRAMES: &str = "mend the pose in [frames], or estimate it (pose = \"estimated\")";
@@ -17,12 +18,12 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     if frames.base.pose != FramePose::Estimated {
         let change = "the base's pose estimated";
         let free = |i: &mut Inputs| i.pipeline.frames.base.pose = FramePose::Estimated;
-        all.push(Hypothesis::new("base-frame", "the base", change, FRAMES, free).with(Freedom::Frame));
+        all.push(Hypothesis::new(Code::BaseFrame, "the base", change, FRAMES, free).with(Freedom::Frame));
     }
     if frames.tip.pose != FramePose::Estimated {
         let change = "the tool point estimated";
         let free = |i: &mut Inputs| i.pipeline.frames.tip.pose = FramePose::Estimated;
-        all.push(Hypothesis::new("tool-frame", "the tool", change, FRAMES, free).with(Freedom::Frame));
+        all.push(Hypothesis::new(Code::ToolFrame, "the tool", change, FRAMES, free).with(Freedom::Frame));
     }
     if inputs.pipeline.table.as_ref().is_some_and(|t| t.pose != BoardPose::Estimated) {
         let change = "the board's pose estimated";
@@ -31,20 +32,20 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
                 table.pose = BoardPose::Estimated;
             }
         };
-        all.push(Hypothesis::new("board-pose", "the board", change, TABLE, free).with(Freedom::Frame));
+        all.push(Hypothesis::new(Code::BoardPose, "the board", change, TABLE, free).with(Freedom::Frame));
     }
     let tracked = inputs.dwells().filter(|d| d.tip.is_some()).count();
     if inputs.board.is_some() && tracked > 0 {
         let change = "the tracked point of the tip not used (seated dwells alone)";
         let blind = |i: &mut Inputs| i.each_dwell(|d| d.tip = None);
-        all.push(Hypothesis::new("target-offset", "the tip", change, TARGET, blind).with(Freedom::Frame));
+        all.push(Hypothesis::new(Code::TargetOffset, "the tip", change, TARGET, blind).with(Freedom::Frame));
     }
     if inputs.seen.len() > 1 {
         for (r, seen) in inputs.seen.iter().enumerate() {
             let subject = format!("recording `{}`", seen.name);
             let change = format!("{subject} left out");
             let without = move |i: &mut Inputs| i.seen[r].dwells.clear();
-            let hypothesis = Hypothesis::new("recordings-disagree", subject, change, RECORDINGS, without);
+            let hypothesis = Hypothesis::new(Code::RecordingsDisagree, subject, change, RECORDINGS, without);
             all.push(Hypothesis { recording: Some(r), ..hypothesis.with(Freedom::Frame) });
         }
     }

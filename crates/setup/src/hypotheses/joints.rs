@@ -2,7 +2,7 @@
 
 use super::Hypothesis;
 use armcal_core::units::DEGREES;
-use armcal_core::{Arrival, Dwell, Unit};
+use armcal_core::{Arrival, Code, Dwell, Unit};
 use armcal_stages::Inputs;
 use std::f64::consts::FRAC_PI_2;
 
@@ -25,7 +25,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for order in joint_orders(n) {
         let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
         let change = format!("the joints read in the order {}", words.join(", "));
-        all.push(Hypothesis::new("joint-order", "order of the joints", change, ORDER, move |i| {
+        all.push(Hypothesis::new(Code::JointOrder, "order of the joints", change, ORDER, move |i| {
             i.each_dwell(|d| reorder(d, &order));
         }));
     }
@@ -36,7 +36,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         let each = turning.iter().map(|&j| (vec![j], joint(j)));
         for (set, subject) in each.chain([(turning.clone(), "all joints".to_owned())]) {
             let change = format!("{subject} {words}");
-            all.push(Hypothesis::new("joint-unit", subject, change, UNIT, move |i| {
+            all.push(Hypothesis::new(Code::JointUnit, subject, change, UNIT, move |i| {
                 i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, factor)));
             }));
         }
@@ -45,7 +45,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         let each = (0..n).map(|j| (vec![j], joint(j)));
         for (set, subject) in each.chain([((0..n).collect(), "all joints".to_owned())]) {
             let change = format!("{factor} times the reading of {subject}");
-            all.push(Hypothesis::new("joint-scale", subject, change, COUNTS, move |i| {
+            all.push(Hypothesis::new(Code::JointScale, subject, change, COUNTS, move |i| {
                 i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, factor)));
             }));
         }
@@ -53,7 +53,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for &j in &turning {
         for quarters in [1.0, 2.0, 3.0] {
             let change = format!("the zero of {} moved by {} deg", joint(j), 90.0 * quarters);
-            all.push(Hypothesis::new("joint-zero", joint(j), change, ZERO, move |i| {
+            all.push(Hypothesis::new(Code::JointZero, joint(j), change, ZERO, move |i| {
                 i.each_dwell(|d| shift_reading(d, j, quarters * FRAC_PI_2));
             }));
         }
@@ -66,7 +66,7 @@ pub fn sign_reversal(names: &[String], set: Vec<usize>) -> Hypothesis {
     let joint = |j: &usize| format!("joint {} ({})", j + 1, names[*j]);
     let subject = set.iter().map(joint).collect::<Vec<_>>().join(", ");
     let change = format!("the sign of {subject} reversed");
-    Hypothesis::new("joint-sign", subject, change, SIGN, move |i| {
+    Hypothesis::new(Code::JointSign, subject, change, SIGN, move |i| {
         i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, -1.0)));
     })
 }

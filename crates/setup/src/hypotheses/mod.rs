@@ -10,7 +10,7 @@ mod poses;
 mod readings;
 mod zeros;
 
-use armcal_core::Parameter;
+use armcal_core::{Code, Parameter};
 use armcal_stages::Inputs;
 pub use joints::sign_reversal;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct Hypothesis {
     /// Stable name, `kebab-case`.
-    pub code: &'static str,
+    pub code: Code,
     /// What it is about.
     pub subject: String,
     /// The change that undoes it, to stand behind "with": `joint 2's sign reversed`.
@@ -91,7 +91,7 @@ pub enum Freedom {
 
 impl Hypothesis {
     fn new(
-        code: &'static str,
+        code: Code,
         subject: impl Into<String>,
         change: impl Into<String>,
         remedy: &'static str,
@@ -139,7 +139,7 @@ impl Hypothesis {
     /// Whether it lets the model's own parameters go.
     pub fn of_the_model(&self) -> bool {
         !self.estimated.is_empty()
-            && ["parameter-bound", "parameter-fixed", "joint-zero"].contains(&self.code)
+            && [Code::ParameterBound, Code::ParameterFixed, Code::JointZero].contains(&self.code)
     }
 
     /// The inputs without the mistake.

@@ -4,7 +4,7 @@ use super::joints::ZERO;
 use super::{Estimated, Freedom, Hypothesis};
 use armcal_config::Measure;
 use armcal_core::units::DEGREES;
-use armcal_core::{Against, Parameter, Unit};
+use armcal_core::{Against, Code, Parameter, Unit};
 use armcal_model::Arm;
 use armcal_recording::Streams;
 use armcal_stages::{Change, Inputs};
@@ -29,13 +29,13 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
         let name = p.name.clone();
         if p.nominal.abs() > SMALLEST {
             let change = format!("the sign of {name} reversed");
-            all.push(nominal_change("model-sign", &name, change, -1.0, 0.0));
+            all.push(nominal_change(Code::ModelSign, &name, change, -1.0, 0.0));
         }
         if p.unit == Unit::Radian && (name.ends_with(".theta") || name.ends_with(".alpha")) {
             for quarters in [-1.0, 1.0, 2.0] {
                 let change = format!("{} deg added to {name}", 90.0 * quarters);
                 all.push(nominal_change(
-                    "model-angle",
+                    Code::ModelAngle,
                     &name,
                     change,
                     1.0,
@@ -60,7 +60,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             let names: Vec<String> = own.map(|p| p.name.clone()).collect();
             if !names.is_empty() {
                 let change = format!("all {what} of {model} {words}");
-                all.push(Hypothesis::new("model-unit", model.clone(), change, FILE, move |i| {
+                all.push(Hypothesis::new(Code::ModelUnit, model.clone(), change, FILE, move |i| {
                     i.changes.extend(names.iter().map(|name| Change::nominal(name, factor, 0.0)));
                 }));
             }
@@ -74,7 +74,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
             let change = format!(
                 "the signs of every d and alpha of the DH table{of} reversed (the arm mirrored: of the other hand)"
             );
-            all.push(Hypothesis::new("model-mirrored", model.clone(), change, FILE, move |i| {
+            all.push(Hypothesis::new(Code::ModelMirrored, model.clone(), change, FILE, move |i| {
                 i.changes.extend(mirrored.iter().map(|name| Change::nominal(name, -1.0, 0.0)));
             }));
         }
@@ -82,27 +82,27 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     let exchanged = columns_exchanged(inputs.chain.parameters());
     if !exchanged.is_empty() {
         let change = "the columns a and d of the DH table exchanged";
-        all.push(Hypothesis::new("dh-columns", "the model", change, FILE, move |i| {
+        all.push(Hypothesis::new(Code::DhColumns, "the model", change, FILE, move |i| {
             i.changes.extend(exchanged.clone())
         }));
     }
     if let Some(chain) = inputs.chain.in_other_convention() {
         let change = "the DH table read by the other convention (standard and modified exchanged)";
-        all.push(Hypothesis::new("dh-convention", "the model", change, FILE, move |i| {
+        all.push(Hypothesis::new(Code::DhConvention, "the model", change, FILE, move |i| {
             i.chain = chain.clone()
         }));
     }
     for row in 0.. {
         let Some(chain) = inputs.chain.with_rows_exchanged(row) else { break };
         let change = format!("rows {} and {} of the DH table exchanged", row + 1, row + 2);
-        all.push(Hypothesis::new("dh-rows", "the model", change, FILE, move |i| i.chain = chain.clone()));
+        all.push(Hypothesis::new(Code::DhRows, "the model", change, FILE, move |i| i.chain = chain.clone()));
     }
     for p in at_bound {
         let own = p.name.clone();
         let joint = inputs.chain.joint_names().iter().find(|joint| p.name == format!("{joint}.theta"));
         let (code, subject, remedy) = match joint {
-            Some(joint) => ("joint-zero", format!("the zero of {joint} ({})", p.name), ZERO),
-            None => ("parameter-bound", p.name.clone(), FILE),
+            Some(joint) => (Code::JointZero, format!("the zero of {joint} ({})", p.name), ZERO),
+            None => (Code::ParameterBound, p.name.clone(), FILE),
         };
         let change = format!("{subject} free to leave its bounds");
         let hypothesis =
@@ -112,7 +112,7 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     if at_bound.len() > 1 {
         let own: Vec<String> = at_bound.iter().map(|p| p.name.clone()).collect();
         let change = format!("{} free to leave their bounds", armcal_core::list_names(&own));
-        let hypothesis = Hypothesis::new("parameter-bound", "the model", change, FILE, move |i| {
+        let hypothesis = Hypothesis::new(Code::ParameterBound, "the model", change, FILE, move |i| {
             i.changes.extend(own.iter().map(|name| widen_bounds(name)));
         });
         let estimated = at_bound.iter().map(Estimated::beyond).collect();
@@ -155,7 +155,7 @@ pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
             let lengths = lengths.clone();
             let change =
                 format!("all lengths of {model} {times:.3} times as long (the model file of another arm)");
-            Hypothesis::new("link-length", model.clone(), change, FILE, move |i| {
+            Hypothesis::new(Code::LinkLength, model.clone(), change, FILE, move |i| {
                 i.changes.extend(lengths.iter().map(|name| Change::nominal(name, times, 0.0)));
             })
         }));
@@ -164,7 +164,7 @@ pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
             let name = last.name.clone();
             all.extend(Hypothesis::of_each(&LONGER_MM, 0.0, FAR_LONGER_MM, move |mm| {
                 let change = format!("{mm:+.1} mm added to {name} (a tool that is longer, or was left out)");
-                nominal_change("tool-length", &name, change, 1.0, mm * 1e-3)
+                nominal_change(Code::ToolLength, &name, change, 1.0, mm * 1e-3)
             }));
         }
     }
@@ -187,7 +187,7 @@ pub fn widen_bounds(name: &str) -> Change {
     Change::widened(name, WIDER)
 }
 
-fn nominal_change(code: &'static str, name: &str, change: String, times: f64, plus: f64) -> Hypothesis {
+fn nominal_change(code: Code, name: &str, change: String, times: f64, plus: f64) -> Hypothesis {
     let own = name.to_owned();
     Hypothesis::new(code, name, change, FILE, move |i| i.changes.push(Change::nominal(&own, times, plus)))
 }

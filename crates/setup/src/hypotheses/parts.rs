@@ -1,13 +1,15 @@
 //! What is wrong in some recordings and right in the others: another driver, another homing, another export.
 
 use super::Hypothesis;
+use armcal_core::Code;
 use armcal_stages::Inputs;
 use armcal_stages::still::{TURNS_RAD, value_range};
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Changes that somebody makes between two recordings without noticing.
-const PARTLY: [&str; 5] = ["joint-sign", "joint-order", "joint-unit", "joint-zero", "position-unit"];
+const PARTLY: [Code; 5] =
+    [Code::JointSign, Code::JointOrder, Code::JointUnit, Code::JointZero, Code::PositionUnit];
 const APART: &str = "mend it in the driver that recorded this, or give what differs a pipeline of its own (`armcal pool` fits them \
                      together)";
 
@@ -27,7 +29,7 @@ pub fn hypotheses(inputs: &Inputs, of_all: &[Hypothesis]) -> Vec<Hypothesis> {
     let mut all = Vec::new();
     for h in of_all.iter().filter(|h| !parts.is_empty() && PARTLY.contains(&h.code)) {
         let changed = h.undone(inputs);
-        let of_readings = !["joint-zero", "position-unit"].contains(&h.code);
+        let of_readings = ![Code::JointZero, Code::PositionUnit].contains(&h.code);
         let tells = |part: &Range<usize>| {
             !of_readings || more_than_a_zero(&read_rad(inputs, part), &read_rad(&changed, part))
         };

@@ -2,7 +2,7 @@
 //! bodies taken for each other.
 
 use super::Hypothesis;
-use armcal_core::Pose;
+use armcal_core::{Code, Pose};
 use armcal_dwell::MeanPose;
 use armcal_stages::Inputs;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -35,7 +35,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             [(1e-3, "millimetres"), (1e3, "kilometres"), (1e-2, "centimetres"), (0.0254, "inches")]
         {
             let change = format!("positions read as {words}");
-            all.push(Hypothesis::new("position-unit", "positions", change, STREAMS, move |i| {
+            all.push(Hypothesis::new(Code::PositionUnit, "positions", change, STREAMS, move |i| {
                 map_positions(i, Matrix3::identity() * factor, false);
             }));
         }
@@ -55,7 +55,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         if oriented || base || table {
             let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
             let change = "the sensor's frame mirrored, orientations too";
-            all.push(Hypothesis::new("axis-mirrored", "the sensor's axes", change, STREAMS, move |i| {
+            all.push(Hypothesis::new(Code::AxisMirrored, "the sensor's axes", change, STREAMS, move |i| {
                 map_positions(i, mirror, true);
             }));
         }
@@ -91,24 +91,24 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for (body, present, name) in [(Body::Base, base, "the base"), (Body::Table, table, "the table")] {
         for (turn, words) in [(FRAC_PI_2, "y up"), (-FRAC_PI_2, "y down")].into_iter().filter(|_| present) {
             let change = format!("the pose of {name} taken from a frame with {words} instead of z");
-            all.push(Hypothesis::new("axes-permuted", name, change, STREAMS, move |i| {
+            all.push(Hypothesis::new(Code::AxesPermuted, name, change, STREAMS, move |i| {
                 let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), turn);
                 map_bodies(i, body, |p| p.pose = Pose::from_parts(Vector3::zeros().into(), turned) * p.pose);
             }));
         }
         if present {
             let change = format!("the pose of {name} inverted");
-            all.push(Hypothesis::new("pose-inverted", name, change, STREAMS, move |i| {
+            all.push(Hypothesis::new(Code::PoseInverted, name, change, STREAMS, move |i| {
                 map_bodies(i, body, |p| p.pose = p.pose.inverse());
             }));
         }
     }
     if inputs.dwells().any(|d| tip_orientation(d).is_some()) {
         let change = "the pose of the tip inverted";
-        all.push(Hypothesis::new("pose-inverted", "the tip", change, STREAMS, invert_tips));
+        all.push(Hypothesis::new(Code::PoseInverted, "the tip", change, STREAMS, invert_tips));
         if base || table {
             let change = "the pose of every body inverted";
-            all.push(Hypothesis::new("pose-inverted", "every body", change, STREAMS, |i| {
+            all.push(Hypothesis::new(Code::PoseInverted, "every body", change, STREAMS, |i| {
                 invert_tips(i);
                 for body in [Body::Base, Body::Table] {
                     map_bodies(i, body, |p| p.pose = p.pose.inverse());
@@ -118,7 +118,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     }
     if base && table {
         all.push(Hypothesis::new(
-            "streams-swapped",
+            Code::StreamsSwapped,
             "base and table",
             "the streams of base and table exchanged",
             STREAMS,
@@ -130,7 +130,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
 
 fn scaled_positions(scale: f64) -> Hypothesis {
     let change = format!("the sensor's lengths {scale:.4} times as large");
-    Hypothesis::new("position-scale", "positions", change, CAMERAS, move |i| {
+    Hypothesis::new(Code::PositionScale, "positions", change, CAMERAS, move |i| {
         map_positions(i, Matrix3::identity() * scale, false);
     })
 }
@@ -140,36 +140,36 @@ fn tip_orientation(d: &armcal_core::Dwell) -> Option<UnitQuaternion<f64>> {
 }
 
 /// Axes mirrored, exchanged, or named a place off, positions only.
-fn axis_maps() -> Vec<(Matrix3<f64>, &'static str, &'static str)> {
+fn axis_maps() -> Vec<(Matrix3<f64>, &'static str, Code)> {
     let rows = |a: [f64; 9]| Matrix3::from_row_slice(&a);
     vec![
-        (rows([-1., 0., 0., 0., 1., 0., 0., 0., 1.]), "x axis reversed", "axis-mirrored"),
-        (rows([1., 0., 0., 0., -1., 0., 0., 0., 1.]), "y axis reversed", "axis-mirrored"),
-        (rows([1., 0., 0., 0., 1., 0., 0., 0., -1.]), "z axis reversed", "axis-mirrored"),
-        (rows([0., 1., 0., 1., 0., 0., 0., 0., 1.]), "x and y exchanged", "axes-permuted"),
-        (rows([0., 0., 1., 0., 1., 0., 1., 0., 0.]), "x and z exchanged", "axes-permuted"),
-        (rows([1., 0., 0., 0., 0., 1., 0., 1., 0.]), "y and z exchanged", "axes-permuted"),
-        (rows([0., 1., 0., 0., 0., 1., 1., 0., 0.]), "axes read as y, z, x", "axes-permuted"),
-        (rows([0., 0., 1., 1., 0., 0., 0., 1., 0.]), "axes read as z, x, y", "axes-permuted"),
+        (rows([-1., 0., 0., 0., 1., 0., 0., 0., 1.]), "x axis reversed", Code::AxisMirrored),
+        (rows([1., 0., 0., 0., -1., 0., 0., 0., 1.]), "y axis reversed", Code::AxisMirrored),
+        (rows([1., 0., 0., 0., 1., 0., 0., 0., -1.]), "z axis reversed", Code::AxisMirrored),
+        (rows([0., 1., 0., 1., 0., 0., 0., 0., 1.]), "x and y exchanged", Code::AxesPermuted),
+        (rows([0., 0., 1., 0., 1., 0., 1., 0., 0.]), "x and z exchanged", Code::AxesPermuted),
+        (rows([1., 0., 0., 0., 0., 1., 0., 1., 0.]), "y and z exchanged", Code::AxesPermuted),
+        (rows([0., 1., 0., 0., 0., 1., 1., 0., 0.]), "axes read as y, z, x", Code::AxesPermuted),
+        (rows([0., 0., 1., 1., 0., 0., 0., 1., 0.]), "axes read as z, x, y", Code::AxesPermuted),
     ]
 }
 
 type Turned = fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>;
 
 /// Components in another order, or the inverse. A mean of quaternions taken in one order is the mean of the others.
-fn quaternion_maps() -> [(Turned, &'static str, &'static str); 3] {
+fn quaternion_maps() -> [(Turned, &'static str, Code); 3] {
     [
         (
             |q| quaternion_from_wxyz([q.k, q.w, q.i, q.j]),
             "taken as x, y, z, w instead of w, x, y, z",
-            "quaternion-order",
+            Code::QuaternionOrder,
         ),
         (
             |q| quaternion_from_wxyz([q.i, q.j, q.k, q.w]),
             "taken as w, x, y, z instead of x, y, z, w",
-            "quaternion-order",
+            Code::QuaternionOrder,
         ),
-        (|q| q.conjugate(), "conjugated", "quaternion-conjugate"),
+        (|q| q.conjugate(), "conjugated", Code::QuaternionConjugate),
     ]
 }
 

@@ -1,6 +1,7 @@
 //! What instruments read: in which unit, and in which direction.
 
 use super::Hypothesis;
+use armcal_core::Code;
 use armcal_stages::Inputs;
 
 const READING: &str = "mend `reading` of the [[measure]], its unit or its direction";
@@ -10,10 +11,10 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for measure in inputs.pipeline.measures().into_iter().filter(|m| m.reading_m.is_some()) {
         let subject = format!("the readings of {}", measure.name);
         for (factor, code, words) in [
-            (1e3, "reading-unit", "a thousand times as large (metres read as millimetres)"),
-            (1e-3, "reading-unit", "a thousandth (micrometres read as millimetres)"),
-            (25.4, "reading-unit", "25.4 times as large (inches read as millimetres)"),
-            (-1.0, "reading-sign", "reversed"),
+            (1e3, Code::ReadingUnit, "a thousand times as large (metres read as millimetres)"),
+            (1e-3, Code::ReadingUnit, "a thousandth (micrometres read as millimetres)"),
+            (25.4, Code::ReadingUnit, "25.4 times as large (inches read as millimetres)"),
+            (-1.0, Code::ReadingSign, "reversed"),
         ] {
             let (name, change) = (measure.name.clone(), format!("the readings of {} {words}", measure.name));
             all.push(Hypothesis::new(code, subject.clone(), change, READING, move |i: &mut Inputs| {

@@ -7,7 +7,7 @@ use super::joints::{SIGN, ZERO, scale_reading, shift_reading};
 use super::model::widen_bounds;
 use super::parts::recording_ranges;
 use super::{Estimated, Freedom, Hypothesis};
-use armcal_core::{DwellId, Parameter, Unit};
+use armcal_core::{Code, DwellId, Parameter, Unit};
 use armcal_model::{EffectSpec, Override, Since};
 use armcal_stages::{Change, Inputs};
 use std::f64::consts::FRAC_PI_2;
@@ -53,7 +53,7 @@ fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
     for &j in turning {
         for (quarters, words) in [(1.0, "+90"), (-1.0, "-90"), (2.0, "180")] {
             let change = format!("the sign of {} reversed and {words} deg added to it", joint(j));
-            all.push(Hypothesis::new("joint-sign", joint(j), change, SIGN, move |i| {
+            all.push(Hypothesis::new(Code::JointSign, joint(j), change, SIGN, move |i| {
                 i.each_dwell(|d| {
                     scale_reading(d, j, -1.0);
                     shift_reading(d, j, quarters * FRAC_PI_2);
@@ -65,7 +65,7 @@ fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
         for (a, b) in QUARTERS.iter().flat_map(|a| QUARTERS.map(move |b| (*a, b))) {
             let (subject, degrees) = (format!("{} and {}", joint(j), joint(k)), (90.0 * a, 90.0 * b));
             let change = format!("the zeros of {subject} moved by {} and {} deg", degrees.0, degrees.1);
-            all.push(Hypothesis::new("joint-zero", subject, change, ZERO, move |i| {
+            all.push(Hypothesis::new(Code::JointZero, subject, change, ZERO, move |i| {
                 i.each_dwell(|d| {
                     [(j, a), (k, b)].iter().for_each(|(j, by)| shift_reading(d, *j, by * FRAC_PI_2))
                 });
@@ -84,7 +84,7 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
         Some(p) => all.extend(ZEROS_DEG.iter().map(|start_deg| {
             let change = format!("another zero of {subject} ({theta})");
             let (name, plus) = (theta.clone(), start_deg.to_radians());
-            let hypothesis = Hypothesis::new("joint-zero", subject.clone(), change, ZERO, move |i| {
+            let hypothesis = Hypothesis::new(Code::JointZero, subject.clone(), change, ZERO, move |i| {
                 i.changes.push(Change { plus, ..widen_bounds(&name) });
             });
             hypothesis.estimating(Freedom::Number, vec![Estimated::of(p, FAR_ZERO_RAD)])
@@ -94,7 +94,7 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
             let subject = subject.clone();
             all.extend(Hypothesis::of_each(&SHIFTS_DEG, 0.0, FAR_ZERO_RAD.to_degrees(), move |deg| {
                 let change = format!("the zero of {subject} moved by {deg:.2} deg");
-                Hypothesis::new("joint-zero", subject.clone(), change, ZERO, move |i| {
+                Hypothesis::new(Code::JointZero, subject.clone(), change, ZERO, move |i| {
                     i.each_dwell(|d| shift_reading(d, j, deg.to_radians()));
                 })
             }));
@@ -103,7 +103,7 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
     // No shift undoes another sign.
     all.extend(Hypothesis::of_each(&SHIFTS_DEG, f64::INFINITY, FAR_ZERO_RAD.to_degrees(), move |deg| {
         let change = format!("the sign of {subject} reversed and {deg:.2} deg added to it");
-        Hypothesis::new("joint-sign", subject.clone(), change, SIGN, move |i| {
+        Hypothesis::new(Code::JointSign, subject.clone(), change, SIGN, move |i| {
             i.each_dwell(|d| {
                 scale_reading(d, j, -1.0);
                 shift_reading(d, j, deg.to_radians());
@@ -125,7 +125,7 @@ fn between_recordings(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
             let unit = Some("deg".to_owned());
             let offset =
                 ("offset", Override { unit, start: Some(start_deg), ..bounded_amplitude(ZERO_BOUND_DEG) });
-            all.push(effect_hypothesis("joint-zero", joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
+            all.push(effect_hypothesis(Code::JointZero, joint(j), change, HOMED, spec, offset, SLIPPED_RAD));
         }
     }
     all
@@ -148,6 +148,6 @@ fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
     (far.len() > 1).then(|| {
         let change = "the zeros of all joints free to leave their bounds";
         let widen = move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|p| widen_bounds(&p.name)));
-        Hypothesis::new("joint-zero", "all joints", change, ZERO, widen).estimating(Freedom::Number, far)
+        Hypothesis::new(Code::JointZero, "all joints", change, ZERO, widen).estimating(Freedom::Number, far)
     })
 }

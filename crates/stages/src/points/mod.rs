@@ -11,7 +11,7 @@ use crate::RunError;
 use crate::links::place_on_link;
 use armcal_config::{PointsFile, read_text};
 use armcal_core::robust::median;
-use armcal_core::{Dwell, Pose, Severity, Stage, TipMeasurement, Warning, list_names};
+use armcal_core::{Code, Dwell, Pose, Severity, Stage, TipMeasurement, Warning, list_names};
 use armcal_model::Model;
 use armcal_recording::input::Kind;
 use clock::Offset;
@@ -64,7 +64,7 @@ pub fn assign_to_dwells(
     };
     let all = dwells.len();
     let said = format!("{how}; {without} of {all} dwells have no point{fits}");
-    Ok(Warning::new(severity, Stage::Dwell, "points-file", path.display().to_string(), said))
+    Ok(Warning::new(severity, Stage::Dwell, Code::PointsFile, path.display().to_string(), said))
 }
 
 /// Writes the points into their dwells, the mean where there are several; such errors go together, so it is no better than one.

@@ -4,6 +4,7 @@ pub(super) mod planted;
 
 use super::*;
 use crate::{Assignment, Place};
+use armcal_core::Code;
 use planted::{Plan, Planted, Truth, mukca, paper, rng, tip};
 use proptest::prelude::*;
 use rand::seq::SliceRandom as _;
@@ -104,7 +105,7 @@ fn the_middle_of_a_line_alone_is_ambiguous_and_says_so() {
         };
         assert!(cavities.len() >= 2 && cavities.contains(t), "{cavities:?} without {t}");
     }
-    let codes: Vec<_> = found.warnings.iter().map(|w| &*w.code).collect();
+    let codes: Vec<_> = found.warnings.iter().map(|w| w.code.as_str()).collect();
     assert_eq!(codes, ["association-ambiguous", "too-few-seated"]);
 }
 
@@ -239,7 +240,7 @@ fn a_pose_turned_too_far_is_said() {
     let mut planted = Planted::new(&mut rng(9), paper(), &plan((0..33).collect()));
     planted.world_from_board *= nalgebra::UnitQuaternion::from_euler_angles(0.2, 0.0, 0.0);
     let found = run(&planted, &planted.known()).unwrap();
-    assert!(found.warnings.iter().any(|w| w.code == "board-turned"), "{:?}", found.warnings);
+    assert!(found.warnings.iter().any(|w| w.code == Code::BoardTurned), "{:?}", found.warnings);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::refine::{Explanation, seat_matches};
 use super::rigid::fit_rigid;
 use super::{BoardStart, DwellTip};
 use crate::{Assignment, Association, Board, Place, TableError};
-use armcal_core::{Pose, Severity, Stage, Warning};
+use armcal_core::{Code, Pose, Severity, Stage, Warning};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
@@ -236,7 +236,7 @@ fn association_warnings(
     let lost = count(|p| matches!(p, Place::Unassigned { .. }));
     let near = all.len() - count(|p| matches!(p, Place::FreeSpace));
     if ambiguous > 0 {
-        warn(Severity::Inadequate, "association-ambiguous", ambiguity_message(all, ambiguous));
+        warn(Severity::Inadequate, Code::AssociationAmbiguous, ambiguity_message(all, ambiguous));
     }
     if seated < config.min_seated {
         let message = format!(
@@ -245,7 +245,7 @@ fn association_warnings(
             all.len(),
             config.min_seated
         );
-        warn(Severity::Inadequate, "too-few-seated", message);
+        warn(Severity::Inadequate, Code::TooFewSeated, message);
     }
     if lost > 0 {
         let many = lost as f64 > config.max_unassigned_share * near as f64;
@@ -259,7 +259,7 @@ fn association_warnings(
                 ""
             }
         );
-        warn(severity, "dwells-unassigned", message);
+        warn(severity, Code::DwellsUnassigned, message);
     }
     if let Some(e) = best.filter(|e| e.sigma_m > DOUBTFUL * problem.layout.spacing_m) {
         let message = format!(
@@ -267,7 +267,7 @@ fn association_warnings(
             e.sigma_m * 1e3,
             problem.layout.spacing_m * 1e3
         );
-        warn(Severity::Inadequate, "board-fits-loosely", message);
+        warn(Severity::Inadequate, Code::BoardFitsLoosely, message);
     }
     if let BoardStart::Known(given) = start {
         let turn_deg = given.rotation.angle_to(&board_in_world.rotation).to_degrees();
@@ -277,7 +277,7 @@ fn association_warnings(
                  max_turn_deg = {}; check the declared tilt and the board's pose",
                 config.max_turn_deg
             );
-            warn(Severity::Inadequate, "board-turned", message);
+            warn(Severity::Inadequate, Code::BoardTurned, message);
         }
     }
     warnings
