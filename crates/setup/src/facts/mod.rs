@@ -148,7 +148,7 @@ fn possible_finding(code: Code, subject: String, message: String) -> SetupFindin
 fn mistake_finding(code: Code, subject: String, message: String) -> SetupFinding {
     let certainty = Certainty::Mistake;
     SetupFinding {
-        code: code.into(),
+        code,
         subject,
         message,
         certainty,
