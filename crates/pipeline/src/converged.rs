@@ -264,9 +264,6 @@ fn closing_warnings(rounds: usize, at_table: bool, calibration: &Calibration) ->
     warnings
 }
 
-/// Code of the warning about a fit that does not generalise.
-pub(crate) const HOLDOUT_WORSE: Code = Code::HoldoutWorse;
-
 pub(crate) fn holdout_worse(calibration: &Calibration) -> Option<Warning> {
     let fitted_mm = calibration.holdout.fitted.mean_m * 1e3;
     let nominal_mm = calibration.holdout.nominal.mean_m * 1e3;
@@ -274,7 +271,7 @@ pub(crate) fn holdout_worse(calibration: &Calibration) -> Option<Warning> {
         Warning::new(
             Severity::Inadequate,
             Stage::Calibrate,
-            HOLDOUT_WORSE,
+            Code::HoldoutWorse,
             "hold-out",
             format!(
                 "on held-out points the fit is worse than nominal ({fitted_mm:.3} against {nominal_mm:.3} mm): \

@@ -6,9 +6,6 @@ use armcal_diagnose::{Calibrated, Diagnosis, Nested, diagnose, nested_validation
 use armcal_result::{Run, Undiagnosed};
 use armcal_stages::{RunError, Steps};
 
-/// Code of the warning about a diagnosis that could not be made.
-pub(crate) const DIAGNOSIS_FAILED: Code = Code::DiagnosisFailed;
-
 /// Looks for the effect that the model of a run is missing, if the pipeline wants to know.
 pub(crate) fn diagnose_again(run: &mut Run, pipeline: &Pipeline, progress: &dyn Steps) {
     let found = run_diagnosis(pipeline, &diagnosis_input(run, pipeline), progress);
@@ -43,7 +40,7 @@ pub(crate) fn set_diagnosis(run: &mut Run, found: Result<Option<Diagnosis>, RunE
         Err(e) => {
             let message = format!("what is missing could not be looked for: {e}; the calibration stands");
             let (severity, stage) = (Severity::Inadequate, Stage::Diagnose);
-            run.warnings.push(Warning::new(severity, stage, DIAGNOSIS_FAILED, "diagnosis", message));
+            run.warnings.push(Warning::new(severity, stage, Code::DiagnosisFailed, "diagnosis", message));
             (None, Some(Undiagnosed::Failed))
         }
     };

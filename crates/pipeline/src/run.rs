@@ -1,10 +1,11 @@
 //! The main job, top down: recordings -> samples -> dwells -> places -> observations -> fit -> setup -> diagnosis -> run.
 
-use crate::converged::{HOLDOUT_WORSE, holdout_worse, settle};
-use crate::diagnosed::{DIAGNOSIS_FAILED, diagnose_again};
+use crate::converged::{holdout_worse, settle};
+use crate::diagnosed::diagnose_again;
 use crate::refits::add_refits;
 use armcal_calibrate::calibrate;
 use armcal_config::Pipeline;
+use armcal_core::Code;
 use armcal_model::{EffectSpec, Model};
 use armcal_recording::Recording;
 use armcal_result::Run;
@@ -29,7 +30,7 @@ pub fn recalibrate(
 ) -> Result<(), RunError> {
     run.model = with_effects(pipeline, geometry, effects, &run.observations)?;
     run.calibration = calibrate(&run.model, &run.observations, &pipeline.fit, &pipeline.holdout)?;
-    run.warnings.retain(|w| ![HOLDOUT_WORSE, DIAGNOSIS_FAILED].contains(&w.code));
+    run.warnings.retain(|w| ![Code::HoldoutWorse, Code::DiagnosisFailed].contains(&w.code));
     run.warnings.extend(holdout_worse(&run.calibration));
     if run.setup.mistakes().next().is_none() {
         diagnose_again(run, pipeline, progress);

@@ -40,8 +40,9 @@ function live() {
     draw();
   };
   const refitOnce = async () => {
-    const own = state();
     try {
+      await ready;
+      const own = state();
       const value = await ask("refit", request());
       accepted = own;
       if (wanted) return; // Somebody clicked on.
@@ -87,17 +88,25 @@ function live() {
   $("holdout").addEventListener("change", refit);
   $("keep").addEventListener("click", async () => {
     try {
+      await ready;
       const value = await ask("keep", request());
       $("live-status").textContent = "written: " + value.pipeline;
     } catch (error) {
       $("live-status").textContent = error.message;
     }
   });
-  fetch("choices").then((answer) => answer.json()).then((choices) => {
+  // The run behind the page is made when the first question comes.
+  const begun = state();
+  const offer = async () => {
+    const answer = await fetch("choices");
+    const choices = await answer.json();
+    if (!answer.ok) throw new Error(choices.error);
     $("catalogue").replaceChildren(...choices.effects.map((spec) => { const option = document.createElement("option"); option.value = spec; return option; }));
     $("holdout").replaceChildren(...choices.holdouts.map(([name, value]) => { const option = element("option", name); option.value = JSON.stringify(value); return option; }));
-    accepted = state();
-  });
+    accepted = { ...begun, holdout: $("holdout").value };
+  };
+  const ready = offer();
+  ready.catch((error) => { $("live-status").textContent = error.message; });
   draw();
 }
 
