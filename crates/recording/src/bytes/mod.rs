@@ -15,7 +15,6 @@ pub(crate) mod ranges;
 pub(crate) mod remote;
 pub(crate) mod shortened;
 pub(crate) mod url;
-pub(crate) mod whole;
 
 use crate::bytes::logs::logs_of;
 use crate::bytes::map::Map;

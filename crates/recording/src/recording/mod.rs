@@ -8,6 +8,7 @@ pub(crate) mod losses;
 pub(crate) mod open;
 pub(crate) mod sweep;
 pub(crate) mod visit;
+pub(crate) mod whole;
 pub(crate) mod witness;
 
 use crate::bytes::FileBytes;
