@@ -25,7 +25,7 @@ macro_rules! codes {
             /// What it says, in a sentence.
             pub fn meaning(self) -> &'static str {
                 match self {
-                    $(Code::$name => concat!($($meaning,)+),)+
+                    $(Code::$name => concat!($($meaning,)+).trim_start(),)+
                 }
             }
         }
