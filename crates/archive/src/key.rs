@@ -4,10 +4,9 @@ use crate::error::ArchiveError;
 use armcal_config::ConfigError;
 use armcal_config::{Manifest, Pipeline, RecordingEntry};
 use armcal_recording::{atomic, identity_of, input, make_folder_in, read_with};
-use armcal_result::VERSION;
+use armcal_result::{VERSION, hash_of_parts};
 use armcal_stages::RunError;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
@@ -54,7 +53,7 @@ impl Keys {
             let text = input::read_to_string(&path, input::Kind::Text);
             parts.push(text.map_err(|source| ConfigError::ReadFile { what, path, source })?);
         }
-        Ok(Keys { common: hash(parts), out: out.to_owned() })
+        Ok(Keys { common: hash_of_parts(parts), out: out.to_owned() })
     }
 
     /// The key of one recording.
@@ -67,21 +66,22 @@ impl Keys {
         for path in &entry.paths {
             parts.push(self.identity(path).map_err(in_recording)?);
         }
-        Ok(hash(parts))
+        Ok(hash_of_parts(parts))
     }
 
     /// What all shares of one campaign have in common: settings and manifest.
     pub fn of_campaign(&self, manifest: &Manifest) -> String {
         let path = |p: &PathBuf| p.to_string_lossy().into_owned();
-        let entry =
-            |e: &RecordingEntry| hash(std::iter::once(declaration_hash(e)).chain(e.paths.iter().map(path)));
-        hash(std::iter::once(self.common.clone()).chain(manifest.entries.iter().map(entry)))
+        let entry = |e: &RecordingEntry| {
+            hash_of_parts(std::iter::once(declaration_hash(e)).chain(e.paths.iter().map(path)))
+        };
+        hash_of_parts(std::iter::once(self.common.clone()).chain(manifest.entries.iter().map(entry)))
     }
 
     /// What a file holds, and what is read with it, as a hash; remembered as long as sizes and modification times stay.
     fn identity(&self, path: &Path) -> Result<String, armcal_recording::RecordingError> {
         let name = path.to_string_lossy().into_owned();
-        let memory = self.out.join(SEEN).join(format!("{}.json", &hash([name.clone()])[..32]));
+        let memory = self.out.join(SEEN).join(format!("{}.json", &hash_of_parts([name.clone()])[..32]));
         let (logs, description) = read_with(path);
         let beside = logs.iter().chain(&description).map(PathBuf::as_path);
         let sizes: Option<Vec<_>> = std::iter::once(path).chain(beside).map(size_and_mtime).collect();
@@ -99,7 +99,7 @@ impl Keys {
         let own = identity_of(path)?;
         let identity = match description {
             None => own,
-            Some(description) => hash([own, identity_of(&description)?]),
+            Some(description) => hash_of_parts([own, identity_of(&description)?]),
         };
         if let Some(sizes) = sizes {
             let seen = Seen { schema: SCHEMA.to_owned(), path: name, sizes, identity: identity.clone() };
@@ -132,18 +132,11 @@ fn declaration_hash(entry: &RecordingEntry) -> String {
     let RecordingEntry { tilt, load_kg, loads, points, .. } = entry;
     let points = points.as_ref().map_or(String::new(), |points| {
         let content = input::read_to_string(&points.csv, input::Kind::Data).unwrap_or_default();
-        hash([format!("{points:?}"), content])
+        hash_of_parts([format!("{points:?}"), content])
     });
     let more: String = loads.iter().map(|load| format!(" {}:{:e}", load.at, load.kg)).collect();
-    hash([entry.name(), format!("{:e} {:e} {load_kg:e}{more}{points}", tilt.roll_rad, tilt.pitch_rad)])
-}
-
-/// SHA-256 of parts that cannot run into each other.
-fn hash(parts: impl IntoIterator<Item = String>) -> String {
-    let mut hasher = Sha256::new();
-    for part in parts {
-        hasher.update((part.len() as u64).to_le_bytes());
-        hasher.update(part.as_bytes());
-    }
-    hex::encode(hasher.finalize())
+    hash_of_parts([
+        entry.name(),
+        format!("{:e} {:e} {load_kg:e}{more}{points}", tilt.roll_rad, tilt.pitch_rad),
+    ])
 }

@@ -127,7 +127,7 @@ impl Converged {
         self.setup.mistakes().next().map_or(Ok(()), |mistake| {
             Err(RunError::SetupFirst {
                 pipeline: self.inputs.pipeline.name.clone(),
-                code: mistake.code.to_string(),
+                code: mistake.code,
                 message: mistake.message.clone(),
             })
         })

@@ -1,7 +1,7 @@
 //! What can go wrong with a recording, in words that say what to do next.
 
 use std::borrow::Cow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a recording could not be opened, read or written.
 #[derive(Debug, thiserror::Error)]
@@ -122,6 +122,11 @@ pub enum RecordingError {
     /// A callback of [`crate::Recording::for_each_raw`] stopped the pass.
     #[error("{0}")]
     Stopped(String),
+}
+
+/// Says that a copy cannot be written.
+pub(crate) fn no_room(path: &Path) -> impl Fn(std::io::Error) -> RecordingError {
+    move |source| RecordingError::Copy { path: path.to_owned(), source }
 }
 
 /// ` (did you mean "x"?)`, or nothing.

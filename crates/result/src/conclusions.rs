@@ -3,6 +3,7 @@
 
 use crate::called::Called;
 use crate::error::ResultError;
+use crate::files::hash_of_parts;
 use crate::run::{Run, VERSION};
 use crate::stored::{StoredResultError, attached_texts};
 use armcal_calibrate::Calibration;
@@ -10,7 +11,6 @@ use armcal_core::{Observation, SetupReport};
 use armcal_diagnose::{Calibrated, Diagnosis};
 use armcal_table::Board;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 use std::path::Path;
 
 /// Name of the attachment.
@@ -57,7 +57,7 @@ impl Grounds<'_> {
         let models = model_texts.iter().cloned();
         let numbers =
             format!("{board:?} {observations:?} {:?}", (calibration.fit.values(), &calibration.residuals));
-        hash([VERSION.to_owned(), (*pipeline_text).to_owned(), numbers].into_iter().chain(models))
+        hash_of_parts([VERSION.to_owned(), (*pipeline_text).to_owned(), numbers].into_iter().chain(models))
     }
 }
 
@@ -78,27 +78,16 @@ impl InputFiles<'_> {
     fn hash(&self) -> String {
         let InputFiles { pipeline_text, model_texts, board, identities } = self;
         let others = [VERSION.to_owned(), (*pipeline_text).to_owned(), format!("{board:?} {identities:?}")];
-        hash(others.into_iter().chain(model_texts.iter().cloned()))
+        hash_of_parts(others.into_iter().chain(model_texts.iter().cloned()))
     }
-}
-
-/// Of parts that cannot run into each other.
-fn hash(parts: impl Iterator<Item = String>) -> String {
-    let mut hasher = Sha256::new();
-    for part in parts {
-        hasher.update((part.len() as u64).to_le_bytes());
-        hasher.update(part);
-    }
-    hex::encode(hasher.finalize())
 }
 
 impl Conclusions {
     /// Those of a run; none of one that was not diagnosed.
     pub fn of(run: &Run) -> Option<Conclusions> {
         let Run { pipeline_text, model_texts, board, observations, calibration, .. } = run;
-        let grounds =
-            Grounds { pipeline_text, model_texts, board: board.as_ref(), observations, calibration };
         let board = board.as_ref();
+        let grounds = Grounds { pipeline_text, model_texts, board, observations, calibration };
         let identities = run.recordings.iter().map(|r| r.files().into_iter().map(|f| f.identity).collect());
         let inputs = InputFiles { pipeline_text, model_texts, board, identities: identities.collect() };
         let diagnosis = run.diagnosis.clone()?;

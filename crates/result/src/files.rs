@@ -20,3 +20,13 @@ pub struct ObservedFile {
 pub fn sha256(text: &str) -> String {
     hex::encode(Sha256::digest(text))
 }
+
+/// SHA-256 of parts that cannot run into each other, hexadecimal.
+pub fn hash_of_parts(parts: impl IntoIterator<Item = String>) -> String {
+    let mut hasher = Sha256::new();
+    for part in parts {
+        hasher.update((part.len() as u64).to_le_bytes());
+        hasher.update(part.as_bytes());
+    }
+    hex::encode(hasher.finalize())
+}

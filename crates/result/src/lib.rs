@@ -42,7 +42,7 @@ pub use column::Column;
 pub use comparison::{Comparison, Difference, DwellChange, Moved};
 pub use conclusions::{Conclusions, FILE as CONCLUSIONS_FILE, Grounds, InputFiles};
 pub use error::ResultError;
-pub use files::{ObservedFile, sha256};
+pub use files::{ObservedFile, hash_of_parts, sha256};
 pub use left_out::{INPUT_METADATA, OWN, PREFIX};
 pub use model_file::{ModelFile, marked_xml, model_file_name, model_files};
 pub use pairing::{Paired, Side, Unpaired, pair_dwells};

@@ -1,6 +1,7 @@
 //! What stops a run, in words that say what was being done and to what.
 
 use armcal_config::{ConfigError, Pipeline};
+use armcal_core::Code;
 
 /// Why a run failed.
 #[derive(Debug, thiserror::Error)]
@@ -72,7 +73,7 @@ pub enum RunError {
     #[error(
         "the setup of `{pipeline}` contradicts the data, so no physical effect is looked for [{code}]: {message}"
     )]
-    SetupFirst { pipeline: String, code: String, message: String },
+    SetupFirst { pipeline: String, code: Code, message: String },
 }
 
 /// Makes the errors of the steps of a run those of what leans on runs, by way of its `From<RunError>`.

@@ -1,10 +1,8 @@
-//! One fit: from start values to estimates with intervals.
+//! The fit of any problem in blocks: with its noise and its priors, to estimates with intervals.
 
-use crate::fit::fit_warnings;
 use crate::fit::minimise::{Solved, minimise_objective};
-use crate::fit::priors;
-use crate::fit::priors::PriorScales;
-use crate::fit::wider;
+use crate::fit::priors::{self, PriorScales};
+use crate::fit::{fit_warnings, wider};
 use crate::objective::problem::Problem;
 use crate::objective::remembered::{Looked, Remembered, evaluate_problem};
 use crate::objective::robust::{RobustCost, proposal2_scale};

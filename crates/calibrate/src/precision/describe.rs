@@ -236,27 +236,18 @@ fn join_names(names: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use armcal_core::{Role, Unit};
+    use crate::precision::undetermined::tests::{axis, parameter};
+    use armcal_core::Unit;
 
     fn text(parts: &[(&str, f64)]) -> String {
         let parameters: Vec<Parameter> = parts
             .iter()
             .map(|(name, _)| Parameter {
-                name: (*name).to_string(),
                 unit: if name.ends_with('d') || name.ends_with('x') { Unit::Metre } else { Unit::Radian },
-                nominal: 0.0,
-                lower: -1.0,
-                upper: 1.0,
-                prior_sigma: None,
-                usual: None,
-                assumed: None,
-                free: true,
-                role: Role::Robot,
-                meaning: String::new(),
+                ..parameter(name)
             })
             .collect();
-        let axis = |index| Axis { index, centre: 0.0, scale: 1.0, precision: 1.0, lower: -1.0, upper: 1.0 };
-        let axes: Vec<Axis> = (0..parts.len()).map(axis).collect();
+        let axes: Vec<Axis> = (0..parts.len()).map(|index| axis(index, 1.0)).collect();
         let shares: Vec<(usize, f64)> = parts.iter().map(|p| p.1).enumerate().collect();
         describe_direction(&shares, &axes, &parameters, &DMatrix::identity(parts.len(), parts.len()))
     }

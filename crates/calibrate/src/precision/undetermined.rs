@@ -236,4 +236,4 @@ fn varimax(mut basis: DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may stop")]
 #[path = "../tests/undetermined.rs"]
-mod tests;
+pub(crate) mod tests;

@@ -221,7 +221,7 @@ fn what_no_pair_explains_is_turned_to_few_large_shares() {
     assert!(remaining_directions(&w, &spanned).is_empty());
 }
 
-fn axis(index: usize, scale: f64) -> Axis {
+pub(crate) fn axis(index: usize, scale: f64) -> Axis {
     Axis { index, centre: 0.0, scale, precision: 1.0, lower: -1.0, upper: 1.0 }
 }
 
@@ -255,7 +255,7 @@ fn symmetries_in_the_weak_subspace_are_found_in_units_of_the_prior() {
     );
 }
 
-fn parameter(name: &str) -> Parameter {
+pub(crate) fn parameter(name: &str) -> Parameter {
     Parameter {
         name: name.to_owned(),
         unit: Unit::Metre,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Such files have the name of their database with these endings.
 const ENDINGS: [&str; 2] = ["-wal", "-journal"];
+
 /// Those of a database that are there and hold anything, with their endings.
 pub(crate) fn logs_of(database: &Path) -> Vec<(&'static str, PathBuf)> {
     let beside = |ending: &'static str| (ending, path_beside(database, ending));

@@ -2,10 +2,10 @@
 
 use super::Converted;
 use super::inflate::inflate_message;
-use super::room::no_room;
 use crate::RecordingError;
 use crate::bytes::budget::Allowance;
 use crate::bytes::map::Map;
+use crate::error::no_room;
 use crate::structure::damage::{Damage, Faults};
 use mcap::records::MessageHeader;
 use std::collections::{BTreeMap, BTreeSet};

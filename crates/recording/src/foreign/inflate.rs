@@ -1,9 +1,9 @@
 //! Files and messages that are compressed as a whole (zstd), as rosbag2 does with `compression_mode` FILE and MESSAGE.
 
-use super::room::no_room;
 use crate::RecordingError;
 use crate::bytes::budget::Allowance;
 use crate::bytes::map::Map;
+use crate::error::no_room;
 use crate::structure::damage::Damage;
 use std::borrow::Cow;
 use std::fs::File;

@@ -14,7 +14,6 @@ mod database;
 mod definitions;
 mod inflate;
 pub(crate) mod names;
-mod room;
 mod rosbag2;
 mod wal;
 
@@ -28,9 +27,9 @@ use crate::bytes::FileBytes;
 use crate::bytes::budget::Allowance;
 use crate::bytes::map::Map;
 use crate::bytes::url;
+use crate::error::no_room;
 use crate::structure::damage::Damage;
 use copy::Copy;
-use room::no_room;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Read as _, Write as _};

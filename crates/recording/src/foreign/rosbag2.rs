@@ -9,12 +9,12 @@ use super::database::{
     Stored, compare_index, compare_log, compare_rows, is_of_disk, quick_check, read_error,
 };
 use super::definitions;
-use super::room::no_room;
 use super::wal::{Frames, count_frames, identity};
 use crate::RecordingError;
 use crate::bytes::budget::{Allowance, FREE_VARIABLE, most_definition_bytes};
 use crate::bytes::input;
 use crate::bytes::logs::{logs_of, path_beside};
+use crate::error::no_room;
 use rusqlite::config::DbConfig;
 use rusqlite::limits::Limit;
 use rusqlite::types::ValueRef;

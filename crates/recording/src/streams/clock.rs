@@ -5,7 +5,7 @@
 //! part of every report.
 
 use crate::Clock;
-use crate::streams::request::concat_parts;
+use crate::streams::columns::concat_parts;
 use armcal_core::robust::{percentile, percentile_in};
 
 /// Share of header stamps that must be set for the header clock to be used.

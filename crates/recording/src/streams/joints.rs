@@ -3,7 +3,7 @@
 use crate::decode::JointRow;
 use crate::error::nearest_name;
 use crate::streams::clean::quantisation_step;
-use crate::streams::request::concat_parts;
+use crate::streams::columns::concat_parts;
 use crate::{JointStream, JointUnit, RecordingError};
 use rayon::prelude::*;
 use std::collections::BTreeSet;

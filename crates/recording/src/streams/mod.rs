@@ -2,6 +2,7 @@
 
 pub(crate) mod clean;
 pub(crate) mod clock;
+pub(crate) mod columns;
 pub(crate) mod edges;
 pub(crate) mod fingerprint;
 pub(crate) mod gather;

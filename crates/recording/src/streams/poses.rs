@@ -3,8 +3,9 @@
 use crate::decode::PoseRow;
 use crate::error::nearest_name;
 use crate::streams::clean::Kept;
+use crate::streams::columns::concat_parts;
 use crate::streams::occlusion::Seen;
-use crate::streams::request::{Request, concat_parts};
+use crate::streams::request::Request;
 use crate::{LengthUnit, PoseStream, RecordingError};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;

@@ -11,8 +11,7 @@
 
 use crate::RecordingError;
 use crate::bytes::input;
-use crate::write::guard;
-use crate::write::guard::Over;
+use crate::write::guard::{self, Over};
 use crate::write::seal::sealed_bytes;
 use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
