@@ -57,6 +57,10 @@ codes! {
     TemperatureFahrenheit = "temperature-fahrenheit",
     /// Messages have no stamp of their own, and another time is taken.
     NoStamp = "no-stamp",
+    /// Header stamps do not go on evenly with log time.
+    HeaderClock = "header-clock",
+    /// Rows were stamped when they arrived, many at once, and are spread over the time between.
+    StampsInBursts = "stamps-in-bursts",
     /// Messages could not be decoded.
     Undecodable = "undecodable",
     /// Rows with impossible values were dropped.
@@ -71,6 +75,8 @@ codes! {
     DuplicateStamps = "duplicate-stamps",
     /// Rows with stamps going backwards were sorted into place.
     BackwardStamps = "backward-stamps",
+    /// Two publishers speak on one topic, and one of them is left out.
+    TwoPublishers = "two-publishers",
     /// Messages without all wanted joints were skipped.
     OtherJoints = "other-joints",
     /// Poses were rejected as occluded.
@@ -101,6 +107,8 @@ codes! {
     ClockContradicted = "clock-contradicted",
     /// A declared clock offset cannot be checked.
     ClockUnchecked = "clock-unchecked",
+    /// The tip was seen about once a pause: one measurement each, with the noise that is declared.
+    OneAStop = "one-a-stop",
     /// No dwell was found.
     NoDwells = "no-dwells",
     /// Many pauses are shorter than a dwell must be.

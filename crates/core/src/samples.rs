@@ -14,6 +14,8 @@ pub struct JointSamples {
     pub joint_rad: Vec<Vec<f64>>,
     /// Measured joint effort [N m], one column a joint; NaN where it is missing, `None` where all of it is.
     pub effort_nm: Option<Vec<Vec<f64>>>,
+    /// How far the clock of the stamps is ahead of log time, typically [s]; none where they are not of the sender.
+    pub ahead_of_log_s: Option<f64>,
 }
 
 impl JointSamples {
@@ -33,6 +35,9 @@ impl JointSamples {
     }
 }
 
+/// Below this many rows a second, movements are lost between them.
+pub const FEW_PER_S: f64 = 4.0;
+
 /// Poses of one tracked body in the frame of its sensor. Occluded frames are already removed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PoseSamples {
@@ -46,9 +51,22 @@ pub struct PoseSamples {
     pub position_m: Vec<Vector3<f64>>,
     /// Orientation of the body, where the stream has one; same length as `position_m`.
     pub orientation: Option<Vec<UnitQuaternion<f64>>>,
+    /// How far the clock of the stamps is ahead of log time, typically [s]; none where they are not of the sender.
+    pub ahead_of_log_s: Option<f64>,
 }
 
 impl PoseSamples {
+    /// Whether it has fewer rows than show how a body moves: one pose a stop, as of a camera that is triggered.
+    pub fn is_one_a_stop(&self) -> bool {
+        let span_ns = self.time_ns.last().zip(self.time_ns.first()).map_or(0, |(last, first)| last - first);
+        self.len() > 1 && (self.len() - 1) as f64 / (span_ns as f64 * 1e-9) < FEW_PER_S
+    }
+
+    /// How far its clock is ahead of that of the joints, if messages of both were logged as soon as they were stamped [s].
+    pub fn clock_ahead_s(&self, joints: &JointSamples) -> Option<f64> {
+        Some(self.ahead_of_log_s? - joints.ahead_of_log_s?)
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.time_ns.len()

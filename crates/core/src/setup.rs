@@ -1,7 +1,7 @@
 //! Mistakes of wiring, files, frames and units: what is checked before any physics.
 
-use crate::Code;
 use crate::warning::{Severity, Stage, Warning};
+use crate::{Code, Mend};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,9 @@ pub struct SetupFinding {
     /// Whether an effect that leaves less of the errors takes its place: it estimates numbers, and something remains.
     #[serde(skip)]
     pub gives_way: bool,
+    /// What undoes it where the recordings are read; none where no key does.
+    #[serde(skip)]
+    pub mend: Option<Mend>,
 }
 
 impl SetupFinding {
@@ -124,6 +127,7 @@ mod tests {
             after_mm,
             alternatives: Vec::new(),
             gives_way: false,
+            mend: None,
         };
         let possible = finding(Certainty::Possible, Some(0.61), Some(0.19));
         let sure = finding(Certainty::Mistake, Some(0.61), Some(0.19));

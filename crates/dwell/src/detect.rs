@@ -55,7 +55,8 @@ pub fn detect_dwells<'s>(
         .collect();
     // Where nothing sees the tip, a marker tells when the arm stands still.
     let still = tip.as_ref().or(markers.first().map(|(_, marker)| marker));
-    let found = find_pauses(&encoders, still.filter(|_| config.use_tip), config);
+    let still = still.filter(|seen| config.use_tip && !seen.samples.is_one_a_stop());
+    let found = find_pauses(&encoders, still, config);
 
     let summary =
         Summary { samples, encoders: &encoders, tip: tip.as_ref(), markers: &markers, clock, config };

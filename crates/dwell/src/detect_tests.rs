@@ -331,7 +331,7 @@ fn no_dwells_comes_with_the_threshold_that_would_find_some() {
     let joint_rad = vec![column(&mut r), column(&mut r)];
     let time_ns = (0..n).map(|i| ns(f64::from(i) * 0.01)).collect();
     let names = vec!["shoulder".into(), "elbow".into()];
-    let samples = only_joints(JointSamples { time_ns, names, joint_rad, effort_nm: None });
+    let samples = only_joints(JointSamples { time_ns, names, joint_rad, ..JointSamples::default() });
     let (dwells, warnings) = detect(&samples);
     assert!(dwells.is_empty());
     let message = &warnings[0].message;

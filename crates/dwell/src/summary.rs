@@ -88,7 +88,7 @@ pub(crate) fn gauge_reading(stream: &ScalarSamples, start_ns: i64, end_ns: i64) 
     Some(GaugeReading { mean_m: mean.mean, sigma_m: mean.sigma })
 }
 
-/// The tip over the rows `frames`; none where it was seen fewer than three times.
+/// The tip over the rows `frames`; none where it was seen fewer than three times, but for a stream of one pose a stop.
 pub(crate) fn tip_measurement(
     samples: &PoseSamples,
     frames: Range<usize>,
@@ -97,6 +97,9 @@ pub(crate) fn tip_measurement(
 ) -> Option<TipMeasurement> {
     let floor_m = config.tip_sigma_floor_mm * 1e-3;
     let floor_rad = config.orientation_sigma_floor_deg.to_radians();
+    if frames.len() < MIN_TIP_FRAMES && samples.is_one_a_stop() {
+        return single_pose(samples, frames.last()?, floor_m, floor_rad);
+    }
     if !creeps {
         return pose_mean(samples, frames, floor_m, floor_rad);
     }
@@ -116,6 +119,20 @@ pub(crate) fn tip_measurement(
     let mut mean = pose_mean(&level, frames, floor_m, floor_rad)?;
     mean.covariance_m2 += crept_m * crept_m.transpose() / 12.0;
     Some(mean)
+}
+
+/// One pose, which shows no scatter: its noise is the floor, and what the pipeline declares.
+fn single_pose(samples: &PoseSamples, row: usize, floor_m: f64, floor_rad: f64) -> Option<TipMeasurement> {
+    let position_m = samples.position_m[row];
+    let orientation = samples.orientation.as_ref().map(|turned| turned[row]);
+    position_m.iter().all(|v| v.is_finite()).then(|| TipMeasurement {
+        position_m,
+        covariance_m2: Matrix3::identity() * floor_m * floor_m,
+        orientation,
+        orientation_sigma_rad: orientation.map_or(f64::INFINITY, |_| floor_rad),
+        samples: 1,
+        effective_samples: 1.0,
+    })
 }
 
 /// Robust mean pose with the covariance of that mean, never below the floors.

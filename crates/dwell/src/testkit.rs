@@ -165,7 +165,7 @@ impl Session {
             time_ns,
             names: ["q1", "q2", "q3"].map(String::from).to_vec(),
             joint_rad,
-            effort_nm: None,
+            ..JointSamples::default()
         }
     }
 

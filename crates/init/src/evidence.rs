@@ -138,7 +138,11 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
         let speeds = Speeds::of(&joints.time_ns, tip_m);
         let alike = |at: usize| {
             let seen = recording.body(at).filter(|seen| median_and_travel_m(seen).1 > STANDS_M)?;
-            compare_speeds(&speeds, &Speeds::of(&seen.time_ns, |i| seen.position_m[i]))
+            // Clocks of other epochs are compared by log time.
+            let ahead_s = seen.clock_ahead_s(joints).filter(|s| s.abs() > EPOCH_S).unwrap_or(0.0);
+            let on_robot: Vec<i64> = seen.time_ns.iter().map(|t| t - (ahead_s * 1e9) as i64).collect();
+            let found = compare_speeds(&speeds, &Speeds::of(&on_robot, |i| seen.position_m[i]))?;
+            Some(Likeness { delay_s: found.delay_s + ahead_s, ..found })
         };
         let likenesses: Vec<Option<Likeness>> = (0..all.len()).map(alike).collect();
         // The bodies have one clock: the one that is most alike tells how late it is.
@@ -153,6 +157,9 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
     }
     all
 }
+
+/// Clocks that are further apart by log time are of other epochs [s].
+const EPOCH_S: f64 = 1.0;
 
 /// A body that stays within this stands still [m].
 pub const STANDS_M: f64 = 0.01;

@@ -36,4 +36,6 @@ pub struct Known<'a> {
     pub points: Vec<Points>,
     /// Numbers called temperatures, by topic and path.
     pub warm: &'a [(String, String)],
+    /// Mistakes that are undone where the recordings are read.
+    pub mended: &'a [String],
 }

@@ -33,6 +33,8 @@ pub use roles::{Cast, Role};
 pub use topics::BodyTopic;
 
 use armcal_calibrate::HoldoutConfig;
+use armcal_core::Mend;
+use armcal_recording::Streams;
 use armcal_recording::input::Kind;
 use armcal_stages::associated::Associated;
 use armcal_stages::preprocess;
@@ -60,11 +62,49 @@ pub struct Asked {
     pub out: PathBuf,
 }
 
-/// Looks at the recordings and proposes a pipeline for them; nothing is written.
+/// Looks at the recordings and proposes a pipeline for them; nothing is written. What contradicts the data and can be undone where
+/// they are read is undone, and said.
 ///
 /// # Errors
 /// What is no recording, no arm, joints that are not recorded, an arm that never pauses, nothing that says where the tip was.
 pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitError> {
+    let as_seen = mended(asked, Taken::default(), progress)?;
+    let at_end = as_seen.bodies.iter().any(|(_, cast)| cast.role == Role::Tip);
+    if as_seen.is_plausible() || at_end {
+        return Ok(as_seen);
+    }
+    // A reading that is wrong at the last joint moves the tip from its link to the one before.
+    let last = mended(asked, Taken { at_end: true, ..Taken::default() }, progress);
+    Ok(last.ok().filter(|last| last.is_plausible()).unwrap_or(as_seen))
+}
+
+/// A proposal, and the one in which the mistakes that its trial showed are undone, where that is the better one.
+fn mended(asked: &Asked, taken: Taken, progress: &dyn Steps) -> Result<Proposal, InitError> {
+    let first = propose_taken(asked, &taken, progress)?;
+    let Some(Ok(tried)) = &first.tried else { return Ok(first) };
+    let mut streams = first.pipeline.streams.clone();
+    let undone = !tried.mends.is_empty()
+        && tried.mends.iter().all(|mend| mend.as_ref().is_some_and(|mend| streams.mend(mend)));
+    if !undone {
+        return Ok(first);
+    }
+    let why = tried.mistakes.clone();
+    let again = propose_taken(asked, &Taken { mended: Some(streams), why, ..taken }, progress);
+    Ok(again.ok().filter(|again| again.error_m() < first.error_m()).unwrap_or(first))
+}
+
+/// How the recordings are taken, beside what they show by themselves.
+#[derive(Debug, Clone, Default)]
+struct Taken {
+    /// Streams with the keys that undo mistakes.
+    mended: Option<Streams>,
+    /// The mistakes.
+    why: Vec<String>,
+    /// Whether a body that follows a link before the last is on the last one.
+    at_end: bool,
+}
+
+fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<Proposal, InitError> {
     progress.step("opening the recordings");
     let opened = files::open_all(&asked.inputs, &asked.out)?;
     let points =
@@ -92,7 +132,7 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
     let folders = paths.filter_map(|p| p.parent()).map(Path::to_owned).collect();
     let arm = arm::find(&asked.told, &channels, &folders, &asked.out.with_extension("urdf"))?;
     progress.step("reading the recordings");
-    let read = read::read_recordings(&arm, &channels, &opened)?;
+    let read = read::read_recordings(&arm, &channels, &opened, taken.mended.as_ref())?;
     let pauses: usize = read.recordings.iter().map(|r| r.dwells.len()).sum();
     if pauses < FEWEST_PAUSES {
         let problem = format!(
@@ -105,7 +145,7 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
     progress.step("comparing motions");
     let board = asked.board.as_deref().map(read_board).transpose()?;
     let evidence = evidence::gather(&arm, &read);
-    let (cast, seats) = roles::assign_roles(&arm, &evidence, board.as_ref());
+    let (cast, seats) = roles::assign_roles(&arm, &evidence, board.as_ref(), taken.at_end);
     let tracked = !points.is_empty()
         || cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
     // Where no sensor sees the tip, its pauses show on which link it is, and without a board where it sat.
@@ -126,6 +166,7 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
         sockets,
         points,
         warm: &channels.warm,
+        mended: &taken.why,
     };
     if known.sockets.is_some() && known.board.is_none() {
         progress.step("measuring the sockets");
@@ -207,6 +248,8 @@ pub struct Tried {
     pub mean_m: [f64; 2],
     /// What contradicts the data about the setup, in words.
     pub mistakes: Vec<String>,
+    /// What would undo each of them where the recordings are read.
+    mends: Vec<Option<Mend>>,
 }
 
 /// Calibrates with a proposal whose files may not be written yet: they are put beside a copy of it.
@@ -217,8 +260,9 @@ fn try_proposal(proposal: &Proposal) -> Result<Tried, String> {
         let pipeline = proposal.in_folder(folder.path())?;
         let settled = armcal_pipeline::settle(&pipeline, &Silent)?;
         let judged = settled.fitted.calibration.judged();
-        let mistakes = settled.setup.mistakes().map(|m| m.message.clone()).collect();
-        Ok(Tried { points: judged.fitted.n, mean_m: [judged.nominal.mean_m, judged.fitted.mean_m], mistakes })
+        let (mistakes, mends) = settled.setup.mistakes().map(|m| (m.message.clone(), m.mend.clone())).unzip();
+        let mean_m = [judged.nominal.mean_m, judged.fitted.mean_m];
+        Ok(Tried { points: judged.fitted.n, mean_m, mistakes, mends })
     };
     attempt().map_err(|e| e.to_string())
 }

@@ -24,6 +24,8 @@ pub struct Proposal {
     pub beside: Vec<(PathBuf, String)>,
     /// The bodies and their roles.
     pub bodies: Vec<(BodyTopic, Cast)>,
+    /// Mistakes that it undoes where the recordings are read.
+    pub mended: Vec<String>,
     /// What may be otherwise.
     pub unsure: Vec<String>,
     /// What nothing in the recordings shows, and where to fill it in.
@@ -34,10 +36,32 @@ pub struct Proposal {
     pub tried: Option<Result<Tried, String>>,
 }
 
+/// A calibration that leaves less than this share of the nominal errors, or less than this [m], is of the arm that was recorded.
+const PLAUSIBLE_SHARE: f64 = 0.2;
+const PLAUSIBLE_M: f64 = 2e-3;
+
 impl Proposal {
+    /// Mean error that a first calibration leaves [m]; infinite where there was none.
+    pub fn error_m(&self) -> f64 {
+        match &self.tried {
+            Some(Ok(tried)) => tried.mean_m[1],
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Whether a first calibration leaves errors as of an arm that is read rightly.
+    pub fn is_plausible(&self) -> bool {
+        let nominal_m = match &self.tried {
+            Some(Ok(tried)) => tried.mean_m[0],
+            _ => 0.0,
+        };
+        self.error_m() < PLAUSIBLE_M.max(PLAUSIBLE_SHARE * nominal_m)
+    }
+
     /// Whether a first calibration with it went well.
     pub fn runs(&self) -> bool {
-        matches!(&self.tried, Some(Ok(tried)) if tried.mistakes.is_empty())
+        let sound = matches!(&self.tried, Some(Ok(tried)) if tried.mistakes.is_empty());
+        sound && self.is_plausible()
     }
 
     /// The same pipeline with the unwritten files in another folder.
@@ -71,7 +95,9 @@ impl Known<'_> {
         let Draft { page, folder, beside, unsure, unseen, .. } = draft;
         let mut head = Page::default();
         head.note(MARK);
-        for (what, all) in [("unsure", &unsure), ("not visible in the recordings", &unseen)] {
+        let mended = self.mended.to_vec();
+        let notes = [("undone", &mended), ("unsure", &unsure), ("not visible in the recordings", &unseen)];
+        for (what, all) in notes {
             all.iter().for_each(|said| head.note(&format!("{what}: {said}")));
         }
         let name = self.asked.out.file_stem().unwrap_or_default().to_string_lossy();
@@ -85,6 +111,7 @@ impl Known<'_> {
             out: self.asked.out.clone(),
             beside,
             bodies,
+            mended,
             unsure,
             unseen,
             left,

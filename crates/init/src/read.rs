@@ -57,8 +57,13 @@ pub fn body_key(body: usize) -> String {
     format!("b{body:03}")
 }
 
-/// Reads all that may be used.
-pub fn read_recordings(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Result<AllRead, InitError> {
+/// Reads all that may be used, with the keys of streams in which mistakes are undone.
+pub fn read_recordings(
+    arm: &Arm,
+    channels: &Channels,
+    opened: &[Opened],
+    mended: Option<&Streams>,
+) -> Result<AllRead, InitError> {
     let mut left = Vec::new();
     let mut bodies: Vec<BodyTopic> = Vec::new();
     for body in &channels.bodies {
@@ -100,6 +105,7 @@ pub fn read_recordings(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Res
         temperature: channels.temperatures.first().map(thermometer),
         ..Streams::default()
     };
+    mended.iter().for_each(|mended| take_mends(&mut streams, mended));
     left.extend(channels.temperatures.iter().skip(1).map(|t| (t.clone(), "another thermometer".to_owned())));
     let mut all = |streams: &mut Streams| -> Result<Vec<Read>, InitError> {
         opened.iter().map(|one| read_one(one, streams, &mut left)).collect()
@@ -111,6 +117,23 @@ pub fn read_recordings(arm: &Arm, channels: &Channels, opened: &[Opened]) -> Res
         recordings = all(&mut streams)?;
     }
     Ok(AllRead { streams, bodies, recordings, left })
+}
+
+/// The keys that undo mistakes, of streams of the same topics and bodies.
+fn take_mends(streams: &mut Streams, mended: &Streams) {
+    for (own, mended) in streams.joints.iter_mut().zip(&mended.joints) {
+        let JointStream { names, factors, zeros_deg, .. } = mended.clone();
+        (own.names, own.factors, own.zeros_deg) = (names, factors, zeros_deg);
+    }
+    let still = [&mended.tip, &mended.base, &mended.table].into_iter().flatten();
+    let all: Vec<&PoseStream> = still.chain(mended.bodies.values()).collect();
+    for own in streams.bodies.values_mut() {
+        let same = |m: &&&PoseStream| (&m.topic, &m.body, &m.frame) == (&own.topic, &own.body, &own.frame);
+        if let Some(mended) = all.iter().find(same) {
+            let PoseStream { axes, orientation_axes, invert, .. } = **mended;
+            (own.axes, own.orientation_axes, own.invert) = (axes, orientation_axes, invert);
+        }
+    }
 }
 
 fn read_one(
@@ -142,9 +165,7 @@ fn correct_streams(
 ) -> Option<()> {
     let joints = &mut streams.joints[0];
     match error {
-        RecordingError::WrongUnit { role: "joints", why, .. }
-            if joints.unit == JointUnit::Rad && why.contains("degrees") =>
-        {
+        RecordingError::WrongUnit { role: "joints", likely: Some("deg"), .. } => {
             joints.unit = JointUnit::Deg;
             Some(())
         }

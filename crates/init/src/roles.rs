@@ -77,10 +77,18 @@ pub struct Cast {
     pub is_tool_point: bool,
 }
 
-/// Every body with its role, and what the board says where there is one.
-pub fn assign_roles(arm: &Arm, evidence: &[Evidence], board: Option<&Board>) -> (Vec<Cast>, Option<Seats>) {
+/// Every body with its role, and what the board says where there is one. `at_end` puts what follows a link on the last one.
+pub fn assign_roles(
+    arm: &Arm,
+    evidence: &[Evidence],
+    board: Option<&Board>,
+    at_end: bool,
+) -> (Vec<Cast>, Option<Seats>) {
     let mut all: Vec<Cast> = evidence.iter().map(|e| first_look(arm, e)).collect();
     let last = arm.carried.len() - 1;
+    for cast in all.iter_mut().filter(|cast| at_end && matches!(cast.role, Role::Marker(_))) {
+        (cast.role, cast.sure) = (Role::Marker(last), true);
+    }
     let at_end: Vec<usize> = (0..all.len()).filter(|b| all[*b].role == Role::Marker(last)).collect();
     let still: Vec<usize> = (0..all.len()).filter(|b| all[*b].role == Role::Still).collect();
     let seats = board.and_then(|board| find_seats(board, evidence, &at_end, &still));

@@ -86,7 +86,13 @@ pub enum RecordingError {
     Body { role: &'static str, topic: String, why: String, nearest: Option<String>, present: Vec<String> },
     /// The numbers of a stream cannot be in the declared unit.
     #[error("stream `{role}`: topic {topic:?}: {why}")]
-    WrongUnit { role: &'static str, topic: String, why: String },
+    WrongUnit {
+        role: &'static str,
+        topic: String,
+        /// The unit that they look like, as the configuration spells it, where there is one.
+        likely: Option<&'static str>,
+        why: String,
+    },
     /// A clock was asked for that the stream does not have.
     #[error("stream `{role}`: topic {topic:?} cannot use clock = \"{clock}\": {why}")]
     NoClock { role: &'static str, topic: String, clock: &'static str, why: String },

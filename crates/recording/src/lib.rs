@@ -49,7 +49,7 @@ pub use report::*;
 pub use streams::fingerprint::{Fingerprint, SharedTime};
 pub use streams::transforms::{Chain, Transforms};
 pub use streams::{
-    Encoder, GaugeStream, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams,
+    Axis, Encoder, GaugeStream, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams,
 };
 pub use structure::raw::{
     Attachment, MetadataVisitor, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor,

@@ -56,5 +56,6 @@ pub fn each_alone(inputs: &Inputs, together: &Fitted, before: &Misfit) -> Option
         after_mm: Some(after_m * 1e3),
         alternatives: Vec::new(),
         gives_way: false,
+        mend: None,
     })
 }

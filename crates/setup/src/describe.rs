@@ -1,15 +1,19 @@
 //! What a change would do, in words.
 
 use super::beyond;
-use super::hypotheses::{Estimated, Hypothesis};
+use super::hypotheses::{Estimated, Hypothesis, Mending};
 use super::spread::spread_m;
 use super::trial::Misfit;
 use super::weigh::{SAME_FACTOR, in_doubt};
-use armcal_calibrate::Calibration;
+use armcal_calibrate::{Calibration, Estimate};
 use armcal_core::units::format_mm;
-use armcal_core::{Certainty, SetupFinding};
+use armcal_core::{Certainty, Code, Mend, SetupFinding};
+use armcal_model::{EffectSpec, EffectTable};
+use armcal_recording::Streams;
 use armcal_stages::{Fitted, Inputs};
 
+/// The effect that scales what the sensor sees along each axis.
+const SENSOR_SCALE: &str = "sensor_scale";
 /// Parameters of a change that are told, at most.
 const TOLD: usize = 3;
 
@@ -84,6 +88,7 @@ pub fn setup_finding(
     alternatives: &[String],
     moved: Option<String>,
     (before, after): (&Side<'_>, &Side<'_>),
+    streams: &Streams,
 ) -> SetupFinding {
     let or = match alternatives.is_empty() {
         true => String::new(),
@@ -91,15 +96,32 @@ pub fn setup_finding(
     };
     let ends = moved
         .unwrap_or_else(|| after.fitted.map_or(String::new(), |f| describe_estimates(h, &f.calibration)));
+    let mend = mending_keys(h, after);
+    let keys = mend.as_ref().and_then(|mend| streams.mending_keys(mend));
+    let undone = keys.map_or(String::new(), |keys| format!("; until then, {keys} undoes it"));
     SetupFinding {
         code: h.code,
         subject: h.subject.clone(),
-        message: format!("with {together}{or} {gain}{ends}; {}", h.remedy),
+        message: format!("with {together}{or} {gain}{ends}; {}{undone}", h.remedy),
         certainty: Certainty::Mistake,
         before_mm: before.fitted.map(|_| before.mean_m() * 1e3),
         after_mm: Some(after.mean_m() * 1e3),
         alternatives: alternatives.to_vec(),
         gives_way: h.of_the_model() && in_doubt(&after.trial),
+        mend,
+    }
+}
+
+/// The keys that make a change; the zero of a joint is where its parameter came out.
+fn mending_keys(h: &Hypothesis, after: &Side<'_>) -> Option<Mend> {
+    match h.mending.as_ref()? {
+        Mending::Keys(mend) => Some(mend.clone()),
+        Mending::Zero(joint) => {
+            let (fitted, own) = (after.fitted?, h.estimated.first()?);
+            let e = fitted.calibration.fit.estimates.iter().find(|e| e.parameter.name == own.parameter)?;
+            let joints = fitted.geometry.chain().joint_names().len();
+            Some(Mend::of_reading(*joint, joints, 1.0, e.value - own.nominal))
+        }
     }
 }
 
@@ -128,6 +150,21 @@ pub fn moved_frame(now: &Inputs, h: &Hypothesis, from: &Fitted, to: &Fitted) -> 
         format_mm(m),
         rad.to_degrees()
     ))
+}
+
+/// The scale of the sensor with its standard error, estimated beside the arm where the change has brought it near.
+pub fn scale_with_interval(mended: &Inputs, h: &Hypothesis) -> Option<String> {
+    let near = h.number.as_ref().filter(|_| h.code == Code::PositionScale)?.value;
+    let mut with = mended.clone();
+    with.pipeline.effects.push(EffectTable::from(&EffectSpec::new(SENSOR_SCALE)));
+    let fitted = with.fit().ok()?;
+    let own = |e: &&Estimate| e.parameter.name.starts_with(SENSOR_SCALE);
+    let axes: Vec<(f64, f64)> =
+        fitted.calibration.fit.estimates.iter().filter(own).map(|e| (e.value, e.sigma)).collect();
+    let mean = |of: fn(&(f64, f64)) -> f64| axes.iter().map(of).sum::<f64>() / axes.len() as f64;
+    let (scale, sigma) = (near / (1.0 + mean(|axis| axis.0)), near * mean(|axis| axis.1));
+    let ends = scale.is_finite() && sigma.is_finite();
+    ends.then(|| format!(" (estimated beside the arm: {scale:.4} ± {sigma:.4})"))
 }
 
 #[cfg(test)]

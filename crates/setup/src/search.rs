@@ -3,7 +3,7 @@
 use super::alone::each_alone;
 use super::attempt::{Tried, fit_hypotheses};
 use super::beyond::Physics;
-use super::describe::{Side, describe_gain, moved_frame, setup_finding};
+use super::describe::{Side, describe_gain, moved_frame, scale_with_interval, setup_finding};
 use super::hypotheses::{Freedom, Hypothesis, hypotheses_by_rarity};
 use super::trial::{Misfit, compute_misfit, for_trials};
 use super::unseen::untestable_sign;
@@ -11,7 +11,7 @@ use super::weigh::{
     ALIKE_FACTOR, at_the_floor, explains_errors, far_enough, in_doubt, is_certain, most_parsimonious,
     physics_explains_better,
 };
-use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
+use armcal_core::{Certainty, Code, Parameter, Role, SetupFinding, SetupReport};
 use armcal_stages::{Fitted, Inputs};
 
 /// Mistakes one upon the other.
@@ -61,7 +61,10 @@ fn one_upon_the_other(
             first.as_ref().map(|f| HOPELESS * f.calibration.judged().nominal.mean_m);
         let (mut tried, mut within) = (Vec::new(), Vec::new());
         let physics = Physics::of(&now, first.as_ref());
-        for some in hypotheses_by_rarity(&now, &at_bound) {
+        // Fewer equations than parameters follow any number that is let go.
+        let few = first.as_ref().is_some_and(has_too_few_dwells);
+        for mut some in hypotheses_by_rarity(&now, &at_bound) {
+            some.retain(|h| !few || h.freedom == Freedom::Discrete);
             // A frame that is let go takes a share of anything: what is rarer may still fit better.
             if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {
                 report.tried += some.len();
@@ -111,9 +114,14 @@ fn confirm_mistakes(
     let together = found.iter().map(|(h, _)| h.change.as_str()).collect::<Vec<_>>().join(" and ");
     let sides = (&Side { fitted, trial: begun }, &Side { fitted: after.as_ref(), trial: ended });
     let Some(gain) = describe_gain(sides.0, sides.1) else { return Vec::new() };
+    // The keys of each hold what those before it did.
+    let mut streams = inputs.pipeline.streams.clone();
     let one = |(h, alternatives): &Found| {
         let moved = fitted.zip(after.as_ref()).and_then(|(from, to)| moved_frame(&mended, h, from, to));
-        setup_finding(h, (&together, &gain), alternatives, moved, sides)
+        let moved = moved.or_else(|| scale_with_interval(&mended, h));
+        let finding = setup_finding(h, (&together, &gain), alternatives, moved, sides, &streams);
+        finding.mend.iter().for_each(|mend| _ = streams.mend(mend));
+        finding
     };
     found.iter().map(one).collect()
 }
@@ -132,7 +140,9 @@ fn possible_explanation(
     let before = Side { fitted: Some(fitted), trial: *begun };
     let after = Side { fitted: Some(&mended), trial: *misfit };
     let gain = describe_gain(&before, &after)?;
-    let finding = setup_finding(hypothesis, (&hypothesis.change, &gain), &[], moved, (&before, &after));
+    let streams = &inputs.pipeline.streams;
+    let finding =
+        setup_finding(hypothesis, (&hypothesis.change, &gain), &[], moved, (&before, &after), streams);
     Some(SetupFinding { certainty: Certainty::Possible, ..finding })
 }
 
@@ -168,6 +178,10 @@ fn classify_explanations(
         }
     }
     (far, within)
+}
+
+fn has_too_few_dwells(fitted: &Fitted) -> bool {
+    fitted.calibration.fit.warnings.iter().any(|w| w.code == Code::TooFewDwells)
 }
 
 fn at_bound(fitted: &Fitted) -> Vec<Parameter> {

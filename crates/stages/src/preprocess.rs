@@ -12,13 +12,16 @@ use crate::seen::RecordingData;
 use crate::unaligned::{Reading, what_would_align};
 use armcal_config::{BoardPose, FramePose, Pipeline, RecordingEntry};
 use armcal_core::robust::{median, percentile};
-use armcal_core::{FeatureId, JointSamples, PoseSamples, Samples, Warning};
-use armcal_dwell::{MeanPose, align_clocks, detect_dwells, mean_pose};
+use armcal_core::{Code, FeatureId, JointSamples, PoseSamples, Samples, Severity, Stage, Warning};
+use armcal_dwell::{ClockAlignment, MeanPose, align_clocks, detect_dwells, mean_pose};
 use armcal_model::{Chain, Model};
 use armcal_recording::{Fingerprint, Recording, SharedTime};
 use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// Clocks that are further apart by log time are of other epochs [s].
+const EPOCH_S: f64 = 1.0;
 
 /// Two recordings that hold the same readings over some time.
 pub struct Repeat {
@@ -126,6 +129,10 @@ fn dwells_of_one(
         Some((feature, tip)) => {
             let doubts = Doubts::of(pipeline, speed_model, feature);
             let aligned = align_clocks(&samples.joints, tip, &doubts, &pipeline.clock);
+            let aligned = match (aligned, tip.is_one_a_stop()) {
+                (Err(_), true) => Ok(clock_of_stops(&samples.joints, tip)),
+                (aligned, _) => aligned,
+            };
             let (clock, said) = aligned.map_err(|source| {
                 let with = |reading: &Reading| {
                     let arm = doubts.scaled(reading.lengths);
@@ -204,6 +211,27 @@ fn alignment_feature<'s>(samples: &'s Samples, model: &Model) -> Option<(Feature
         false => Some((feature, samples.bodies.get(name)?)),
     });
     seen.into_iter().find(|(_, seen)| !seen.is_empty())
+}
+
+/// One pose a stop shows no motion: its clock is that of the joints, but for what log time tells of their epochs.
+fn clock_of_stops(joints: &JointSamples, tip: &PoseSamples) -> (ClockAlignment, Vec<Warning>) {
+    let offset_s = tip.clock_ahead_s(joints).filter(|s| s.abs() > EPOCH_S).unwrap_or(0.0);
+    let clock = ClockAlignment {
+        offset_s,
+        offset_sigma_s: 0.0,
+        drift: 0.0,
+        drift_sigma: 0.0,
+        reference_ns: tip.time_ns.first().copied().unwrap_or_default(),
+        correlation: f64::NAN,
+        displacement_ratio: f64::NAN,
+        declared: true,
+    };
+    let message = format!(
+        "the tip was seen {} times, too rarely to show its movements: what was seen in a pause is one measurement each, on the clock \
+         of the joints, and its noise is what `sensor_sigma_mm` under [observations] declares",
+        tip.len()
+    );
+    (clock, vec![Warning::new(Severity::Notice, Stage::Dwell, Code::OneAStop, "clock", message)])
 }
 
 /// The error of clocks that cannot be aligned, with the reading that would align them.

@@ -164,7 +164,7 @@ mod tests {
             time_ns: (0..columns[0].len() as i64).map(|i| i * 10_000_000).collect(),
             names: columns.iter().enumerate().map(|(j, _)| format!("j{j}")).collect(),
             joint_rad: columns,
-            effort_nm: None,
+            ..JointSamples::default()
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::readings::LEAP_RAD;
 use crate::still::{still_tip, value_range};
 use armcal_core::units::DEGREES;
-use armcal_core::{JointSamples, PoseSamples, Samples};
+use armcal_core::{FEW_PER_S, JointSamples, PoseSamples, Samples};
 
 /// With the right reading, the speeds agree like this.
 const AGREES: f64 = 0.97;
@@ -11,8 +11,6 @@ const AGREES: f64 = 0.97;
 const SAME: f64 = 1e-3;
 /// Ratios of gears and units that are mistaken for none.
 const RATIOS: [f64; 5] = [2.0, 3.0, 5.0, 57.2958, 100.0];
-/// Below this many readings a second, movements are lost between them.
-const FEW_PER_S: f64 = 4.0;
 
 /// What the clocks are aligned with.
 #[derive(Clone)]

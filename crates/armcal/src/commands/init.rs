@@ -4,6 +4,7 @@ use super::{Outcome, json_text, print};
 use crate::error::Error;
 use crate::progress::Progress;
 use armcal_core::printable_name;
+use armcal_core::units::format_mm;
 use armcal_init::{Asked, Proposal, Told, propose};
 use armcal_recording::{Over, RecordingError, atomic, file_has_content, input, may_put, may_write_over};
 use clap::Args;
@@ -121,7 +122,9 @@ fn proposal_text(proposal: &Proposal) -> String {
             printable_name(&cast.why)
         );
     }
-    for (what, all) in [("Unsure", &proposal.unsure), ("Not visible", &proposal.unseen)] {
+    for (what, all) in
+        [("Undone", &proposal.mended), ("Unsure", &proposal.unsure), ("Not visible", &proposal.unseen)]
+    {
         for said in all {
             let _ = writeln!(out, " {what}: {}", printable_name(said));
         }
@@ -131,14 +134,22 @@ fn proposal_text(proposal: &Proposal) -> String {
     }
     match &proposal.tried {
         Some(Ok(tried)) => {
-            let [before, after] = tried.mean_m.map(|m| m * 1e3);
+            let [before, after] = tried.mean_m.map(format_mm);
+            let goes = if tried.mean_m[1] < tried.mean_m[0] { "falls" } else { "does not fall: it goes" };
             let _ = writeln!(
                 out,
-                "\n Tried: on {} points the mean error falls from {before:.2} to {after:.2} mm.",
+                "\n Tried: on {} points the mean error {goes} from {before} to {after} mm.",
                 tried.points
             );
             for mistake in &tried.mistakes {
                 let _ = writeln!(out, " Setup first: {}.", printable_name(mistake));
+            }
+            if tried.mistakes.is_empty() && !proposal.is_plausible() {
+                let _ = writeln!(
+                    out,
+                    " So large an error is none of an arm that is read rightly: look at the order, signs, units and zeros of the \
+                     joints, at which body is the tip, and whether the model is of this arm."
+                );
             }
         }
         Some(Err(why)) => {
@@ -152,7 +163,11 @@ fn proposal_text(proposal: &Proposal) -> String {
         "\nWritten: {}",
         [vec![proposal.out.display().to_string()], beside].concat().join(", ")
     );
-    let _ = writeln!(out, " next:  armcal run {}", proposal.out.display());
+    let next = match proposal.runs() {
+        true => format!("armcal run {}", proposal.out.display()),
+        false => "mend what is said above, here or in the pipeline".to_owned(),
+    };
+    let _ = writeln!(out, " next:  {next}");
     out
 }
 
@@ -172,6 +187,7 @@ fn json_of(proposal: &Proposal) -> Value {
         "pipeline": proposal.out.display().to_string(),
         "beside": proposal.beside.iter().map(|(path, _)| path.display().to_string()).collect::<Vec<_>>(),
         "bodies": bodies.collect::<Vec<_>>(),
+        "undone": proposal.mended,
         "unsure": proposal.unsure,
         "not_visible": proposal.unseen,
         "not_used": proposal.left.iter().map(|(topic, why)| json!({"topic": topic, "why": why})).collect::<Vec<_>>(),

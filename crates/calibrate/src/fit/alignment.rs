@@ -9,6 +9,7 @@ use crate::FitConfig;
 use crate::fit::rigid_fit::{Pair, nearest_rotation, rigid_fit, weights_of};
 use crate::objective::frame_names::{frame_names, is_free, tips_at};
 use crate::objective::model_problem::ModelProblem;
+use armcal_core::robust::median;
 use armcal_core::{Against, FeatureId, Observation, Parameter, Pose};
 use armcal_model::Model;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -19,6 +20,10 @@ use std::collections::{BTreeMap, BTreeSet};
 const ROUNDS: usize = 200;
 const SETTLED: f64 = 1e-3;
 
+/// A nominal arm that is further off [m] may stand in the wrong place, and is in a better one where this share is left.
+const FAR_M: f64 = 5e-3;
+const BETTER: f64 = 0.95;
+
 /// The alternation on all observations; what a recording has copies of then on its own ones.
 pub(crate) fn closed_form_start(
     problem: &ModelProblem<'_>,
@@ -27,7 +32,16 @@ pub(crate) fn closed_form_start(
     which: &dyn Fn(&Parameter) -> bool,
 ) -> Vec<f64> {
     let model = problem.model();
-    let mut p = Alignment::new(model, problem.observations(), config).run(start, which);
+    let all = Alignment::new(model, problem.observations(), config);
+    let mut p = all.run(start.clone(), which);
+    let error_m = all.median_error_m(&p);
+    if error_m > FAR_M {
+        // An offset that somebody guessed wrongly leads the alternation astray: then from none.
+        let without = all.run(all.without_offsets(start, which), which);
+        if all.median_error_m(&without) < BETTER * error_m {
+            p = without;
+        }
+    }
     if model.copies().is_empty() {
         return p;
     }
@@ -149,6 +163,23 @@ impl<'a> Alignment<'a> {
             }
         }
         p
+    }
+
+    /// The same values with every offset on a link that may be placed at none.
+    fn without_offsets(&self, mut p: Vec<f64>, which: &dyn Fn(&Parameter) -> bool) -> Vec<f64> {
+        let tips = tips_at(self.model);
+        let nominal = self.model.nominal();
+        for (k, (feature, _)) in self.model.features().enumerate() {
+            let Some(name) = self.names.get(tips + k) else { continue };
+            let place = Place::new(self.model, name, &self.model.feature_in_link(&nominal, feature), which);
+            place.position.into_iter().flatten().for_each(|index| p[index] = 0.0);
+        }
+        p
+    }
+
+    fn median_error_m(&self, p: &[f64]) -> f64 {
+        let error = |o: &&Observation| self.model.residual(p, o).position_m.norm();
+        median(&self.observations.iter().map(error).collect::<Vec<_>>())
     }
 
     /// base_from_link of what carries the feature of every observation: the part of the arm that stays at nominal.

@@ -97,7 +97,22 @@ pub fn align_clocks(
     }
     match config.declared() {
         Some(declared) => declared::align(joints, tip, arm, config, declared),
-        None => estimate_alignment(joints, tip, arm, config),
+        None => estimate_alignment(joints, tip, arm, &around_log_time(joints, tip, config)),
+    }
+}
+
+/// Clocks of other epochs are first compared by log time, where the pipeline says nothing of them.
+fn around_log_time<'c>(
+    joints: &JointSamples,
+    tip: &PoseSamples,
+    config: &'c ClockConfig,
+) -> Cow<'c, ClockConfig> {
+    match tip
+        .clock_ahead_s(joints)
+        .filter(|s| config.initial_offset_s == 0.0 && s.abs() > 0.5 * config.max_offset_s)
+    {
+        Some(initial_offset_s) => Cow::Owned(ClockConfig { initial_offset_s, ..config.clone() }),
+        None => Cow::Borrowed(config),
     }
 }
 

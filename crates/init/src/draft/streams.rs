@@ -9,10 +9,12 @@ use crate::roles::Role;
 use crate::seats::table_tilts;
 use crate::topics::BodyTopic;
 use armcal_config::recording_name;
-use armcal_recording::{JointUnit, LengthUnit, StreamReport};
+use armcal_recording::{Axis, JointUnit, LengthUnit, StreamReport};
 use armcal_table::Tilt;
 use std::collections::BTreeSet;
 
+/// Why a key is there that changes what was recorded.
+const UNDONE: &str = "undoes what contradicts the data, as said above";
 /// A sensor that is later than this is searched around its delay [s].
 const LATE_S: f64 = 1.5;
 /// A tilt worth declaring [rad].
@@ -105,6 +107,11 @@ impl Draft<'_> {
         if joints.unit == JointUnit::Deg {
             self.page.line("unit = \"deg\"", "the readings are too large for radians");
         }
+        for (key, list) in [("factors", &joints.factors), ("zeros_deg", &joints.zeros_deg)] {
+            if !list.is_empty() {
+                self.page.line(&format!("{key} = {list:?}"), UNDONE);
+            }
+        }
         let sections = [(Role::Tip, "tip"), (Role::Base, "base")];
         for (body, section) in
             sections.iter().filter_map(|(role, section)| Some((known.of_role(*role)?, *section)))
@@ -186,6 +193,12 @@ impl Draft<'_> {
         }
         if stream.unit == LengthUnit::Mm {
             self.page.line("unit = \"mm\"", "too far away for metres");
+        }
+        if let Some(axes) = stream.axes {
+            self.page.line(&format!("axes = {:?}", axes.map(Axis::word)), UNDONE);
+        }
+        if stream.invert {
+            self.page.line("invert = true", UNDONE);
         }
         self.page.note(&rate_note(report));
     }

@@ -6,6 +6,7 @@
 
 use crate::Clock;
 use crate::streams::columns::concat_parts;
+use crate::streams::sensor_time::{ClockStep, find_clock_step};
 use armcal_core::robust::{percentile, percentile_in};
 
 /// Share of header stamps that must be set for the header clock to be used.
@@ -21,6 +22,8 @@ const SPREAD_SHARE: f64 = 0.02;
 
 /// Where the two clocks differ, one whose steps are off by less than this share of the other's goes on evenly.
 const BLAMELESS: f64 = 0.1;
+
+const A_SECOND_NS: i64 = 1_000_000_000;
 
 /// A stamp must be this many times the spread allowed away from its neighbours before it is called stray.
 const STRAY_SPREADS: f64 = 10.0;
@@ -59,12 +62,40 @@ impl Stamps {
         }
     }
 
+    /// The least header that is a stamp [ns]: one of zero is none that was set, but for the first of a clock that starts with it.
+    fn least_ns(&self) -> i64 {
+        let zeros = self.header_ns.iter().flatten().filter(|ns| **ns == 0).count();
+        let soon = |ns: &&i64| (1..A_SECOND_NS).contains(*ns);
+        let starts = zeros == 1 && self.header_ns.iter().flatten().any(|ns| soon(&ns));
+        i64::from(!starts)
+    }
+
+    /// Header and log time of the rows whose header is set, in the order of log time.
+    fn in_log_order(&self) -> Vec<(i64, i64)> {
+        let (both, least_ns) = (self.header_ns.iter().zip(&self.log_ns), self.least_ns());
+        let set = both.filter_map(|(header, log)| Some((header.filter(|ns| *ns >= least_ns)?, *log)));
+        let mut set: Vec<(i64, i64)> = set.collect();
+        set.sort_by_key(|(_, log)| *log);
+        set
+    }
+
+    /// How far the header's clock is ahead of log time, typically [s]; none where there is no header.
+    pub fn ahead_of_log_s(&self) -> Option<f64> {
+        let mut ahead: Vec<f64> = self
+            .in_log_order()
+            .iter()
+            .map(|(header, log)| header.saturating_sub(*log) as f64 * 1e-9)
+            .collect();
+        (!ahead.is_empty()).then(|| percentile_in(&mut ahead, 0.5))
+    }
+
     /// Takes out the time of each row on the given clock; `None` for a row without it.
     pub fn on(&mut self, clock: Clock) -> Vec<Option<i64>> {
         match clock {
             Clock::Header => {
+                let least_ns = self.least_ns();
                 let mut time = std::mem::take(&mut self.header_ns);
-                time.iter_mut().filter(|t| t.is_some_and(|ns| ns <= 0)).for_each(|t| *t = None);
+                time.iter_mut().filter(|t| t.is_some_and(|ns| ns < least_ns)).for_each(|t| *t = None);
                 time
             }
             Clock::Publish => self.publish_ns.iter().copied().map(Some).collect(),
@@ -119,20 +150,12 @@ pub(crate) fn choose_clock(stamps: &Stamps) -> (Clock, String) {
 /// Why the header stamps can be trusted, or why not.
 pub(crate) fn judge_header(stamps: &Stamps) -> Result<String, String> {
     let rows = stamps.header_ns.len();
-    let in_log_order = (!stamps.log_ns.is_sorted()).then(|| {
-        let mut order: Vec<usize> = (0..rows).collect();
-        order.sort_by_key(|&i| stamps.log_ns[i]);
-        order
-    });
-    let row = |place: usize| in_log_order.as_ref().map_or(place, |order| order[place]);
-    let stamp = |i: usize| stamps.header_ns[i].filter(|ns| *ns > 0).map(|header| (header, stamps.log_ns[i]));
-    let set = (0..rows).filter_map(|place| stamp(row(place)));
-    let (mut stamped, mut backward, mut repeated, mut before) = (0, 0, 0, i64::MIN);
-    for (header, _) in set.clone() {
-        stamped += 1;
-        backward += usize::from(header < before);
-        repeated += usize::from(header == before);
-        before = header;
+    let set = stamps.in_log_order();
+    let (stamped, mut backward, mut repeated, mut before) = (set.len(), 0, 0, i64::MIN);
+    for (header, _) in &set {
+        backward += usize::from(*header < before);
+        repeated += usize::from(*header == before);
+        before = *header;
     }
     if stamped == 0 {
         let carried = stamps.header_ns.iter().any(Option::is_some);
@@ -147,27 +170,36 @@ pub(crate) fn judge_header(stamps: &Stamps) -> Result<String, String> {
     if repeated as f64 > REPEATED_SHARE * rows as f64 {
         return Err(format!("{repeated} of {rows} header stamps repeat the one before"));
     }
-    judge_spread(set)
+    if let Some(ClockStep { by_s, after_s }) = find_clock_step(&set) {
+        return Err(format!(
+            "header stamps step by {by_s:+.3} s against log time, {after_s:.1} s after the first row"
+        ));
+    }
+    judge_spread(&set)
 }
 
 /// Stamps must run like the log clock, whatever their offset from it.
-fn judge_spread(set: impl Iterator<Item = (i64, i64)> + Clone) -> Result<String, String> {
-    let log = || set.clone().map(|(_, log)| log);
-    let duration_s = span_s(log().min(), log().max());
+fn judge_spread(set: &[(i64, i64)]) -> Result<String, String> {
+    let duration_s = span_s(set.first().map(|s| s.1), set.last().map(|s| s.1));
     if duration_s == 0.0 {
         return Ok("header stamps are set and increase; log time stands still".to_owned());
     }
-    let mut latency_s: Vec<f64> = Vec::with_capacity(set.size_hint().1.unwrap_or(0));
-    latency_s.extend(set.clone().map(|(h, log)| log.saturating_sub(h) as f64 * 1e-9));
+    let mut latency_s: Vec<f64> = set.iter().map(|(h, log)| log.saturating_sub(*h) as f64 * 1e-9).collect();
     let spread_s = percentile_in(&mut latency_s, 0.99) - percentile_in(&mut latency_s, 0.01);
     if spread_s > SPREAD_S.max(SPREAD_SHARE * duration_s) {
-        if log_is_to_blame(&set.collect::<Vec<_>>()) {
+        if log_is_to_blame(set) {
             return Ok(format!(
                 "header stamps are set and evenly spaced; log time is not, it lags by up to {spread_s:.1} s as that of a \
                  recorder that stalls"
             ));
         }
-        return Err(format!("header stamps wander {spread_s:.3} s against log time"));
+        let rate = match span_s(set.first().map(|s| s.0), set.last().map(|s| s.0)) / duration_s {
+            rate if (rate - 1.0).abs() > SPREAD_SHARE => {
+                format!(": their clock runs {rate:.4} times as fast")
+            }
+            _ => String::new(),
+        };
+        return Err(format!("header stamps wander {spread_s:.3} s against log time{rate}"));
     }
     Ok(format!("header stamps are set, increase, and follow log time within {:.1} ms", spread_s * 1e3))
 }

@@ -11,6 +11,8 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 const ROLE: &str = "joints";
+/// Above this no reading is an angle in degrees by its likely size: it is an encoder's count.
+const COUNTS_RAD: f64 = 1000.0;
 
 /// Readings of the wanted joints.
 #[derive(Debug, Default)]
@@ -127,6 +129,7 @@ pub(crate) fn check_config(stream: &JointStream) -> Result<(), RecordingError> {
     if !(stream.max_turns.is_finite() && stream.max_turns > 0.0) {
         return wrong(format!("`max_turns` must be positive, not {}", stream.max_turns));
     }
+    stream.check_mends().or_else(wrong)?;
     if stream.unit != JointUnit::Counts {
         return match stream.encoders.is_empty() {
             true => Ok(()),
@@ -150,6 +153,17 @@ pub(crate) fn check_config(stream: &JointStream) -> Result<(), RecordingError> {
         }
     }
     Ok(())
+}
+
+impl JointStream {
+    /// How much of its unit a radian is; of counts, of the finest encoder.
+    pub(crate) fn unit_per_rad(&self) -> f64 {
+        match self.unit {
+            JointUnit::Rad => 1.0,
+            JointUnit::Deg => 1.0_f64.to_degrees(),
+            JointUnit::Counts => self.encoders.iter().map(|e| e.counts_per_turn / TAU).fold(1.0, f64::max),
+        }
+    }
 }
 
 /// Readings of joint after joint in radians.
@@ -187,7 +201,7 @@ pub(crate) fn check_unit(joint_rad: &[Vec<f64>], stream: &JointStream) -> Result
     let name = &stream.names[j];
     let otherwise = "or raise `max_turns` if the joint really winds that far";
     let why = match stream.unit {
-        JointUnit::Rad if reach_rad > 1000.0 => {
+        JointUnit::Rad if reach_rad > COUNTS_RAD => {
             format!(
                 "joint {name} reaches {reach_rad:.0} rad, which looks like encoder counts: set unit = \"counts\" with `encoders`"
             )
@@ -211,7 +225,12 @@ pub(crate) fn check_unit(joint_rad: &[Vec<f64>], stream: &JointStream) -> Result
             )
         }
     };
-    Err(RecordingError::WrongUnit { role: ROLE, topic: stream.topic.clone(), why })
+    let likely = match stream.unit {
+        JointUnit::Rad if reach_rad <= COUNTS_RAD => Some("deg"),
+        JointUnit::Rad | JointUnit::Deg => Some("counts"),
+        JointUnit::Counts => None,
+    };
+    Err(RecordingError::WrongUnit { role: ROLE, topic: stream.topic.clone(), likely, why })
 }
 
 /// Whether the readings of each row are ones that a joint can have; a flipped bit gives the others. `None` where all are.

@@ -7,17 +7,21 @@ pub(crate) mod edges;
 pub(crate) mod fingerprint;
 pub(crate) mod gather;
 pub(crate) mod joints;
+pub(crate) mod mend;
 pub(crate) mod occlusion;
 pub(crate) mod poses;
+pub(crate) mod publishers;
 pub(crate) mod read;
 pub(crate) mod reading;
 pub(crate) mod request;
+pub(crate) mod sensor_time;
 pub(crate) mod temperature;
 pub(crate) mod together;
 pub(crate) mod transforms;
 
 use crate::Clock;
 use crate::decode::Place;
+pub use mend::Axis;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -95,6 +99,12 @@ pub struct JointStream {
     /// With `unit = "counts"`: one encoder a joint, in the order of `names`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub encoders: Vec<Encoder>,
+    /// What each reading is multiplied by, -1 for an encoder that counts the other way; all 1 when absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub factors: Vec<f64>,
+    /// What is then added to each reading [deg]; all 0 when absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zeros_deg: Vec<f64>,
     /// Clock; chosen automatically, with its reason recorded, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<Clock>,
@@ -132,6 +142,8 @@ impl Default for JointStream {
             effort: None,
             unit: JointUnit::Rad,
             encoders: Vec::new(),
+            factors: Vec::new(),
+            zeros_deg: Vec::new(),
             clock: None,
             max_turns: default_max_turns(),
             arm: None,
@@ -222,6 +234,15 @@ pub struct PoseStream {
     /// Unit of the positions; default `m`.
     #[serde(default)]
     pub unit: LengthUnit,
+    /// Which of the published axes, with its sign, is x, y and z of the position: `["x", "-z", "y"]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axes: Option<[Axis; 3]>,
+    /// The same of the frame that the orientation turns in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation_axes: Option<[Axis; 3]>,
+    /// Whether what is published is the pose of the sensor in the body, not of the body in the sensor's frame.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub invert: bool,
     /// Clock; chosen automatically, with its reason recorded, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<Clock>,

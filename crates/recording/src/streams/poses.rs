@@ -60,13 +60,11 @@ impl PoseTable {
 
 /// Checks what can be checked before reading.
 pub(crate) fn check_config((role, stream): (&'static str, &PoseStream)) -> Result<(), RecordingError> {
-    match stream.orientation.is_some() && stream.position.is_none() {
-        true => Err(RecordingError::Config {
-            role,
-            why: "`orientation` is the path of a field beside `position`: give both".into(),
-        }),
-        false => Ok(()),
-    }
+    let why = match stream.orientation.is_some() && stream.position.is_none() {
+        true => Err("`orientation` is the path of a field beside `position`: give both".to_owned()),
+        false => stream.check_mends(),
+    };
+    why.map_err(|why| RecordingError::Config { role, why })
 }
 
 /// Refuses a stream that mixes bodies.
@@ -164,7 +162,8 @@ pub(crate) fn check_unit(
             format!("the body is {reach_m:.0} m from the origin even as millimetres: not a position")
         }
     };
-    Err(RecordingError::WrongUnit { role, topic: stream.topic.clone(), why })
+    let likely = (stream.unit == LengthUnit::M).then_some("mm");
+    Err(RecordingError::WrongUnit { role, topic: stream.topic.clone(), likely, why })
 }
 
 /// Whether a position is one that a laboratory can hold; a flipped bit gives the others.

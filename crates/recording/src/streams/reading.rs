@@ -6,13 +6,19 @@ use crate::streams::gather::Gathered;
 use crate::streams::joints;
 use crate::streams::occlusion::{Verdict, reject_frozen, reject_unseen};
 use crate::streams::poses;
+use crate::streams::publishers::find_other_publisher;
 use crate::streams::request::Request;
+use crate::streams::sensor_time::spread_bursts;
 use crate::streams::temperature::{Scale, like_fahrenheit};
 use crate::{
     Chain, Clock, GaugeStream, JointStream, Occlusion, PoseStream, RecordingError, ScalarStream,
     StreamReport, Streams,
 };
 use armcal_core::{Code, JointSamples, PoseSamples, ScalarSamples, Severity, Stage, Warning};
+
+/// Readings of two publishers are this far apart [rad], [m].
+const PUBLISHERS_APART_RAD: f64 = 0.3;
+const PUBLISHERS_APART_M: f64 = 0.05;
 
 /// What is read of one stream; `None` where it holds nothing and that is no error.
 pub(crate) enum Columns {
@@ -27,6 +33,8 @@ pub(crate) struct Reading<'a> {
     gathered: Gathered,
     /// What joins its rows to the frame and the body that were asked for.
     chain: Option<&'a Chain>,
+    /// How far its clock is ahead of log time [s].
+    ahead_of_log_s: Option<f64>,
     /// What became of its rows.
     pub report: StreamReport,
     /// What is said of them.
@@ -56,7 +64,7 @@ impl Reading<'_> {
             largest_gap_s: 0.0,
             quantisation_rad: Vec::new(),
         };
-        Reading { role: request.role, gathered, chain, report, warnings: Vec::new() }
+        Reading { role: request.role, gathered, chain, ahead_of_log_s: None, report, warnings: Vec::new() }
     }
 
     /// The columns of the stream of these that stands at `place` among the requests, which begin with the joints.
@@ -100,6 +108,9 @@ impl Reading<'_> {
         }
         let finite = |i: usize| table.position.iter().all(|column| column[i].is_finite());
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, finite);
+        self.leave_other_publisher(&mut rows, PUBLISHERS_APART_RAD * stream.unit_per_rad(), |i, row| {
+            row.extend(table.position.iter().map(|column| column[i]));
+        });
         drop_duplicates(&mut rows, &mut counts);
         let mut joint_rad = rows.of_columns(table.position);
         joints::to_rad(&mut joint_rad, stream);
@@ -120,7 +131,11 @@ impl Reading<'_> {
         for (said, arm) in self.warnings.iter_mut().filter_map(|said| Some((said, stream.arm.as_ref()?))) {
             said.subject = format!("{arm}: {}", said.subject);
         }
-        Ok(JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm })
+        let ahead_of_log_s = self.ahead_of_log_s;
+        let mut samples =
+            JointSamples { time_ns, names: stream.names.clone(), joint_rad, effort_nm, ahead_of_log_s };
+        stream.mend_readings(&mut samples);
+        Ok(samples)
     }
 
     fn poses(&mut self, stream: &PoseStream) -> Result<PoseSamples, RecordingError> {
@@ -135,9 +150,15 @@ impl Reading<'_> {
         }
         poses::check_body(role, stream, &table)?;
         let (mut rows, mut counts) = in_time_order(&self.time(role, stream.clock)?, |i| table.is_finite(i));
+        if let Some(bursts) = stream.clock.is_none().then(|| spread_bursts(&mut rows.time_ns)).flatten() {
+            self.say(Severity::Notice, Code::StampsInBursts, bursts.told());
+        }
         poses::check_unit(role, stream, &table, &rows)?;
         self.drop_impossible(&mut rows, |i| poses::is_possible(&table.seen[i]));
         let Verdict { mut occluded, oriented } = reject_unseen(&mut rows, &table.seen);
+        self.leave_other_publisher(&mut rows, PUBLISHERS_APART_M, |i, row| {
+            row.extend(table.seen[i].position_m)
+        });
         drop_duplicates(&mut rows, &mut counts);
         occluded.frozen = reject_frozen(&mut rows, &table.seen);
         self.report.occluded = occluded;
@@ -158,20 +179,21 @@ impl Reading<'_> {
         let text =
             "rows have a quaternion, but not all of about unit length: the stream is read as positions only";
         self.counted(Severity::Notice, Code::OrientationUnusable, unoriented, text);
-        let samples = PoseSamples {
+        let mut samples = PoseSamples {
             frame_id: table.frames.first().cloned().unwrap_or_default(),
             body: stream.body.clone().or_else(|| table.bodies.first().cloned()).unwrap_or_default(),
             time_ns,
             position_m,
             orientation,
+            ahead_of_log_s: self.ahead_of_log_s,
         };
-        let Some(chain) = self.chain else { return Ok(samples) };
-        self.say(Severity::Notice, Code::TransformChain, chain.told());
-        chain.composed(samples).map_err(|why| RecordingError::NotDecodable {
-            role,
-            topic: stream.topic.clone(),
-            why,
-        })
+        let unusable = |why| RecordingError::NotDecodable { role, topic: stream.topic.clone(), why };
+        if let Some(chain) = self.chain {
+            self.say(Severity::Notice, Code::TransformChain, chain.told());
+            samples = chain.composed(samples).map_err(unusable)?;
+        }
+        stream.mend_poses(&mut samples).map_err(unusable)?;
+        Ok(samples)
     }
 
     /// None where the sensor never saw it: a marker that is hidden costs its own rows, not the recording.
@@ -251,8 +273,8 @@ impl Reading<'_> {
             None => choose_clock(&stamps),
             Some(clock) => (clock, "set in the pipeline".to_owned()),
         };
-        let unset = clock == Clock::Header && !stamps.header_ns.iter().flatten().any(|ns| *ns > 0);
-        if unset && !stamps.log_ns.is_empty() {
+        let stamped = stamps.header_ns.iter().flatten().any(|ns| *ns > 0);
+        if clock == Clock::Header && !stamped && !stamps.log_ns.is_empty() {
             let (topic, why) = (self.report.topic.clone(), judge_header(&stamps).err().unwrap_or_default());
             let why = format!("{why}; set \"publish\" or \"log\", or remove the key");
             return Err(RecordingError::NoClock { role, topic, clock: "header", why });
@@ -265,12 +287,37 @@ impl Reading<'_> {
             );
             self.say(Severity::Notice, Code::NoStamp, text);
         }
+        let doubt = match asked {
+            None if clock != Clock::Header && stamped => {
+                Some(format!("{why}; {} time is used in its place", clock.word()))
+            }
+            Some(Clock::Header) => judge_header(&stamps).err().map(|why| {
+                format!("{why}, and are used as the pipeline asks: remove `clock`, or set clock = \"log\"")
+            }),
+            _ => None,
+        };
+        if let Some(doubt) = doubt {
+            self.say(Severity::Notice, Code::HeaderClock, doubt);
+        }
+        let ahead_of_log_s = stamps.ahead_of_log_s();
         let mut time = stamps.on(clock);
         if clock == Clock::Header {
+            self.ahead_of_log_s = ahead_of_log_s;
             self.report.stray_stamps = drop_stray(&mut time, &stamps.log_ns);
         }
         (self.report.clock, self.report.clock_reason) = (clock, why);
         Ok(time)
+    }
+
+    /// Leaves out the rows of a second publisher on the topic, given the numbers of each row of the file.
+    fn leave_other_publisher(&mut self, rows: &mut Kept, apart: f64, of: impl Fn(usize, &mut Vec<f64>)) {
+        let places: Vec<usize> = rows.file_rows().collect();
+        let Some(other) = find_other_publisher(places.len(), |k, row| of(places[k], row), apart) else {
+            return;
+        };
+        other.leave_out(rows);
+        let severity = if other.still_at.is_some() { Severity::Notice } else { Severity::Inadequate };
+        self.say(severity, Code::TwoPublishers, other.told());
     }
 
     /// Removes the rows of the file whose numbers are none a sensor can mean.

@@ -51,6 +51,7 @@ pub(crate) fn as_one(
         names: streams.iter().zip(&all).flat_map(named).collect(),
         joint_rad: columns(&|s, joint, row| s.joint_rad[joint][row]),
         effort_nm: efforts.then(|| columns(&effort)),
+        ahead_of_log_s: all[slowest].ahead_of_log_s,
     })
 }
 
@@ -92,7 +93,7 @@ mod tests {
     fn stream(start_ms: i64, period_ms: i64, rows: i64) -> JointSamples {
         let time_ns: Vec<i64> = (0..rows).map(|i| (start_ms + i * period_ms) * 1_000_000).collect();
         let joint_rad = vec![time_ns.iter().map(|t| *t as f64 * 1e-9).collect()];
-        JointSamples { time_ns, names: vec!["joint1".into()], joint_rad, effort_nm: None }
+        JointSamples { time_ns, names: vec!["joint1".into()], joint_rad, ..JointSamples::default() }
     }
 
     fn of(arms: &[&str]) -> Vec<JointStream> {

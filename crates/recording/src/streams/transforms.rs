@@ -263,6 +263,7 @@ impl Chain {
             time_ns: samples.time_ns,
             position_m: poses.iter().map(|p| p.translation.vector).collect(),
             orientation: Some(poses.iter().map(|p| p.rotation).collect()),
+            ahead_of_log_s: samples.ahead_of_log_s,
         })
     }
 }

@@ -156,6 +156,7 @@ fn mistake_finding(code: Code, subject: String, message: String) -> SetupFinding
         after_mm: None,
         alternatives: Vec::new(),
         gives_way: false,
+        mend: None,
     }
 }
 

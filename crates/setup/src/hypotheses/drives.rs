@@ -2,10 +2,11 @@
 //!
 //! Rarer than a sign or an order: tried where none of those explains the errors.
 
-use super::joints::{scale_reading, shift_reading};
+use super::joints::{scale_reading, scaled_readings, shift_reading};
 use super::model::{WIDER, widen_bounds};
 use super::{Estimated, Freedom, Hypothesis};
-use armcal_core::{Code, Parameter, Unit};
+use armcal_core::units::DEGREES;
+use armcal_core::{Code, Mend, Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override};
 use armcal_stages::{Change, Inputs};
 use std::collections::BTreeMap;
@@ -16,6 +17,11 @@ const FREE: &str = "leave out `free = false`, or mend the values that are held f
 const FIXED: &str = "free it in the model file, or mend its value there";
 const PRIORS: &str = "mend the values in the model file, or widen the deviation that it allows";
 
+const RANGE: &str = "publish angles, or give the factor of the unit";
+
+/// Scales that all joints may have in common, the first and the last only as neighbours, and what no gear is off by.
+const COMMON_SCALES: [f64; 11] = [0.2, 0.35, 0.5, 0.7, 0.85, 1.0, 1.2, 1.45, 2.0, 3.0, 5.0];
+const FAR_COMMON_SCALE: f64 = 0.03;
 /// Ratios of gears and units that are mistaken for none; those near 1 are in `joints`.
 const RATIOS: [f64; 6] = [3.0, 5.0, 10.0, 50.0, 100.0, 1000.0];
 /// A ratio further from 1 than this is no tolerance of a gear or pulley.
@@ -37,11 +43,9 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let each = (0..names.len()).map(|j| (vec![j], joint(j)));
     for (set, subject) in each.chain([((0..names.len()).collect(), "all joints".to_owned())]) {
         for ratio in RATIOS {
-            let (set, subject) = (set.clone(), subject.clone());
             let change = format!("the reading of {subject} divided by {ratio}");
-            all.push(Hypothesis::new(Code::JointScale, subject, change, RATIO, move |i| {
-                i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, 1.0 / ratio)));
-            }));
+            let (subject, set) = (subject.clone(), set.clone());
+            all.push(scaled_readings(subject, change, RATIO, names.len(), set, 1.0 / ratio));
         }
     }
     for &j in turning.iter().skip(1) {
@@ -58,6 +62,12 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             }));
         }
     }
+    all.extend(shares_of_ranges(inputs));
+    let n = names.len();
+    all.extend(Hypothesis::of_each(&COMMON_SCALES, 1.0, FAR_COMMON_SCALE, move |scale| {
+        let change = format!("{scale:.4} times the readings of all joints (a unit that they have in common)");
+        scaled_readings("all joints".to_owned(), change, RANGE, n, (0..n).collect(), scale)
+    }));
     for j in 0..names.len() {
         let change = format!("the gear ratio of {} estimated", joint(j));
         let spec = EffectSpec::new("gear_ratio").at(j);
@@ -65,6 +75,41 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         all.push(effect_hypothesis(Code::JointScale, joint(j), change, RATIO, spec, scale, RATIO_OFF));
     }
     all
+}
+
+/// Readings that are shares of the range between each joint's limits, as low-cost arms publish them.
+fn shares_of_ranges(inputs: &Inputs) -> Vec<Hypothesis> {
+    let n = inputs.chain.joint_names().len();
+    let own = |j: usize| inputs.chain.joint_limits(j, [f64::INFINITY, f64::NEG_INFINITY]);
+    let ranges: Vec<[f64; 2]> = (0..n).map(own).collect();
+    if n < 2 || ranges.iter().flatten().any(|end| !end.is_finite()) {
+        return Vec::new();
+    }
+    // What the whole range reads, from its middle, and where the middle reads.
+    let scales = [
+        ("per cent of their range, from -100 to 100", 100.0 * DEGREES, 0.0),
+        ("per cent of their range, from 0 to 100", 50.0 * DEGREES, 50.0 * DEGREES),
+        ("shares of their range, from -1 to 1", 1.0, 0.0),
+        ("shares of their range, from 0 to 1", 0.5, 0.5),
+    ];
+    let hypothesis = |(words, half, middle): (&str, f64, f64)| {
+        let factor = |[low, high]: &[f64; 2]| 0.5 * (high - low) / half;
+        let zero = |range: &[f64; 2]| 0.5 * (range[0] + range[1]) - factor(range) * middle;
+        let factors: Vec<f64> = ranges.iter().map(factor).collect();
+        let zeros_rad: Vec<f64> = ranges.iter().map(zero).collect();
+        let mend = Mend::Readings { factors: factors.clone(), zeros_rad: zeros_rad.clone() };
+        let change = format!("the readings of all joints taken for {words}");
+        let take = move |i: &mut Inputs| {
+            i.each_dwell(|d| {
+                for (j, (factor, zero)) in factors.iter().zip(&zeros_rad).enumerate() {
+                    scale_reading(d, j, *factor);
+                    shift_reading(d, j, *zero);
+                }
+            });
+        };
+        Hypothesis::new(Code::JointUnit, "all joints", change, RANGE, take).mended_by(mend)
+    };
+    scales.into_iter().map(hypothesis).collect()
 }
 
 /// Parameters that the model file holds fixed, each and together, and priors that are too tight.

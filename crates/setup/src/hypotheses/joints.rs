@@ -2,7 +2,7 @@
 
 use super::Hypothesis;
 use armcal_core::units::DEGREES;
-use armcal_core::{Arrival, Code, Dwell, Unit};
+use armcal_core::{Arrival, Code, Dwell, Mend, Unit};
 use armcal_stages::Inputs;
 use std::f64::consts::FRAC_PI_2;
 
@@ -25,9 +25,10 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     for order in joint_orders(n) {
         let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
         let change = format!("the joints read in the order {}", words.join(", "));
-        all.push(Hypothesis::new(Code::JointOrder, "order of the joints", change, ORDER, move |i| {
-            i.each_dwell(|d| reorder(d, &order));
-        }));
+        let mend = Mend::Order(order.clone());
+        let reorder_all = move |i: &mut Inputs| i.each_dwell(|d| reorder(d, &order));
+        let hypothesis = Hypothesis::new(Code::JointOrder, "order of the joints", change, ORDER, reorder_all);
+        all.push(hypothesis.mended_by(mend));
     }
     for (factor, words) in [
         (1.0 / DEGREES, "read as degrees instead of radians"),
@@ -45,20 +46,34 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         let each = (0..n).map(|j| (vec![j], joint(j)));
         for (set, subject) in each.chain([((0..n).collect(), "all joints".to_owned())]) {
             let change = format!("{factor} times the reading of {subject}");
-            all.push(Hypothesis::new(Code::JointScale, subject, change, COUNTS, move |i| {
-                i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, factor)));
-            }));
+            all.push(scaled_readings(subject, change, COUNTS, n, set, factor));
         }
     }
     for &j in &turning {
         for quarters in [1.0, 2.0, 3.0] {
-            let change = format!("the zero of {} moved by {} deg", joint(j), 90.0 * quarters);
-            all.push(Hypothesis::new(Code::JointZero, joint(j), change, ZERO, move |i| {
-                i.each_dwell(|d| shift_reading(d, j, quarters * FRAC_PI_2));
-            }));
+            let by_deg = if quarters == 3.0 { -90.0 } else { 90.0 * quarters };
+            let change = format!("the zero of {} moved by {by_deg} deg", joint(j));
+            let shift = move |i: &mut Inputs| i.each_dwell(|d| shift_reading(d, j, quarters * FRAC_PI_2));
+            let hypothesis = Hypothesis::new(Code::JointZero, joint(j), change, ZERO, shift);
+            all.push(hypothesis.mended_by(Mend::of_reading(j, n, 1.0, quarters * FRAC_PI_2)));
         }
     }
     all
+}
+
+/// The readings of some of `n` joints times a factor.
+pub fn scaled_readings(
+    subject: String,
+    change: String,
+    remedy: &'static str,
+    n: usize,
+    set: Vec<usize>,
+    factor: f64,
+) -> Hypothesis {
+    let factors = (0..n).map(|j| if set.contains(&j) { factor } else { 1.0 }).collect();
+    let mend = Mend::Readings { factors, zeros_rad: vec![0.0; n] };
+    let scale = move |i: &mut Inputs| i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, factor)));
+    Hypothesis::new(Code::JointScale, subject, change, remedy, scale).mended_by(mend)
 }
 
 /// The signs of these joints reversed.
@@ -66,9 +81,10 @@ pub fn sign_reversal(names: &[String], set: Vec<usize>) -> Hypothesis {
     let joint = |j: &usize| format!("joint {} ({})", j + 1, names[*j]);
     let subject = set.iter().map(joint).collect::<Vec<_>>().join(", ");
     let change = format!("the sign of {subject} reversed");
-    Hypothesis::new(Code::JointSign, subject, change, SIGN, move |i| {
-        i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, -1.0)));
-    })
+    let factors = (0..names.len()).map(|j| if set.contains(&j) { -1.0 } else { 1.0 }).collect();
+    let mend = Mend::Readings { factors, zeros_rad: vec![0.0; names.len()] };
+    let reverse = move |i: &mut Inputs| i.each_dwell(|d| set.iter().for_each(|&j| scale_reading(d, j, -1.0)));
+    Hypothesis::new(Code::JointSign, subject, change, SIGN, reverse).mended_by(mend)
 }
 
 /// Each joint, every two of them, all.

@@ -10,7 +10,7 @@ mod poses;
 mod readings;
 mod zeros;
 
-use armcal_core::{Code, Parameter};
+use armcal_core::{Code, Mend, Parameter};
 use armcal_stages::Inputs;
 pub use joints::sign_reversal;
 use std::sync::Arc;
@@ -34,8 +34,19 @@ pub struct Hypothesis {
     pub estimated: Vec<Estimated>,
     /// The recording that it leaves out, where it leaves one out.
     pub recording: Option<usize>,
+    /// What makes the change where recordings are read, where a key does.
+    pub mending: Option<Mending>,
     /// The change itself.
     pub apply: Arc<dyn Fn(&mut Inputs) + Send + Sync>,
+}
+
+/// What makes a change where recordings are read.
+#[derive(Debug, Clone)]
+pub enum Mending {
+    /// These keys.
+    Keys(Mend),
+    /// The zero of this joint, by what the one estimated parameter comes out as.
+    Zero(usize),
 }
 
 /// A number of which a few values are tried; the best one is then refined between its neighbours.
@@ -107,6 +118,7 @@ impl Hypothesis {
             number: None,
             estimated: Vec::new(),
             recording: None,
+            mending: None,
             apply: Arc::new(apply),
         }
     }
@@ -126,6 +138,10 @@ impl Hypothesis {
                 Hypothesis { number: Some(number), freedom: Freedom::Number, ..at(w[1]) }
             })
             .collect()
+    }
+
+    fn mended_by(self, mend: Mend) -> Hypothesis {
+        Hypothesis { mending: Some(Mending::Keys(mend)), ..self }
     }
 
     fn with(self, freedom: Freedom) -> Hypothesis {

@@ -50,6 +50,7 @@ fn restrict_to_part(h: &Hypothesis, part: &Range<usize>, words: &str) -> Hypothe
         subject: format!("{}, {words}", h.subject),
         change: format!("{} {words}", h.change),
         remedy: APART,
+        mending: None,
         apply: Arc::new(move |inputs: &mut Inputs| {
             let mut changed = inputs.clone();
             apply(&mut changed);

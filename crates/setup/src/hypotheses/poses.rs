@@ -2,7 +2,7 @@
 //! bodies taken for each other.
 
 use super::Hypothesis;
-use armcal_core::{Code, Pose};
+use armcal_core::{Code, Mend, Pose};
 use armcal_dwell::MeanPose;
 use armcal_stages::Inputs;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -42,14 +42,14 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         all.extend(Hypothesis::of_each(&SCALES, 1.0, FAR_SCALE, scaled_positions));
         for (matrix, words, code) in axis_maps() {
             let change = format!("the sensor's {words}");
-            all.push(Hypothesis::new(code, "the sensor's axes", change, STREAMS, move |i| {
-                map_positions(i, matrix, false);
-            }));
+            let map = move |i: &mut Inputs| map_positions(i, matrix, false);
+            let hypothesis = Hypothesis::new(code, "the sensor's axes", change, STREAMS, map);
+            all.push(hypothesis.mended_by(Mend::Axes(matrix)));
             if base || table {
                 let change = format!("the {words} in the stream of the tip");
-                all.push(Hypothesis::new(code, "the tip", change, STREAMS, move |i| {
-                    map_tips(i, matrix, false)
-                }));
+                let map = move |i: &mut Inputs| map_tips(i, matrix, false);
+                let hypothesis = Hypothesis::new(code, "the tip", change, STREAMS, map);
+                all.push(hypothesis.mended_by(Mend::AxesOfArm(matrix)));
             }
         }
         if oriented || base || table {
@@ -105,15 +105,18 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     }
     if inputs.dwells().any(|d| tip_orientation(d).is_some()) {
         let change = "the pose of the tip inverted";
-        all.push(Hypothesis::new(Code::PoseInverted, "the tip", change, STREAMS, invert_tips));
+        let hypothesis = Hypothesis::new(Code::PoseInverted, "the tip", change, STREAMS, invert_tips);
+        all.push(hypothesis.mended_by(Mend::TipInverted));
         if base || table {
             let change = "the pose of every body inverted";
-            all.push(Hypothesis::new(Code::PoseInverted, "every body", change, STREAMS, |i| {
+            let invert = |i: &mut Inputs| {
                 invert_tips(i);
                 for body in [Body::Base, Body::Table] {
                     map_bodies(i, body, |p| p.pose = p.pose.inverse());
                 }
-            }));
+            };
+            let hypothesis = Hypothesis::new(Code::PoseInverted, "every body", change, STREAMS, invert);
+            all.push(hypothesis.mended_by(Mend::Inverted));
         }
     }
     if base && table {

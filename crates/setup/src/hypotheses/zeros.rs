@@ -6,8 +6,8 @@ use super::drives::{bounded_amplitude, effect_hypothesis};
 use super::joints::{SIGN, ZERO, scale_reading, shift_reading};
 use super::model::widen_bounds;
 use super::parts::recording_ranges;
-use super::{Estimated, Freedom, Hypothesis};
-use armcal_core::{Code, DwellId, Parameter, Unit};
+use super::{Estimated, Freedom, Hypothesis, Mending};
+use armcal_core::{Code, DwellId, Mend, Parameter, Unit};
 use armcal_model::{EffectSpec, Override, Since};
 use armcal_stages::{Change, Inputs};
 use std::f64::consts::FRAC_PI_2;
@@ -49,27 +49,26 @@ fn joint_label(inputs: &Inputs, j: usize) -> String {
 /// One joint with another sign and a quarter or half turn, two joints with that much of a zero.
 fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
     let joint = |j: usize| joint_label(inputs, j);
+    let n = inputs.chain.joint_names().len();
     let mut all = Vec::new();
     for &j in turning {
         for (quarters, words) in [(1.0, "+90"), (-1.0, "-90"), (2.0, "180")] {
             let change = format!("the sign of {} reversed and {words} deg added to it", joint(j));
-            all.push(Hypothesis::new(Code::JointSign, joint(j), change, SIGN, move |i| {
-                i.each_dwell(|d| {
-                    scale_reading(d, j, -1.0);
-                    shift_reading(d, j, quarters * FRAC_PI_2);
-                });
-            }));
+            all.push(reversed_and_moved((joint(j), n), j, change, quarters * FRAC_PI_2));
         }
     }
     for (&j, &k) in turning.iter().flat_map(|j| turning.iter().filter(move |k| *k > j).map(move |k| (j, k))) {
         for (a, b) in QUARTERS.iter().flat_map(|a| QUARTERS.map(move |b| (*a, b))) {
             let (subject, degrees) = (format!("{} and {}", joint(j), joint(k)), (90.0 * a, 90.0 * b));
             let change = format!("the zeros of {subject} moved by {} and {} deg", degrees.0, degrees.1);
-            all.push(Hypothesis::new(Code::JointZero, subject, change, ZERO, move |i| {
-                i.each_dwell(|d| {
-                    [(j, a), (k, b)].iter().for_each(|(j, by)| shift_reading(d, *j, by * FRAC_PI_2))
-                });
-            }));
+            let moved = [(j, a * FRAC_PI_2), (k, b * FRAC_PI_2)];
+            let shift = move |i: &mut Inputs| {
+                i.each_dwell(|d| moved.iter().for_each(|(j, by)| shift_reading(d, *j, *by)));
+            };
+            let of = |i: usize| moved.iter().find(|(j, _)| *j == i).map_or(0.0, |(_, by)| *by);
+            let mend = Mend::Readings { factors: vec![1.0; n], zeros_rad: (0..n).map(of).collect() };
+            let hypothesis = Hypothesis::new(Code::JointZero, subject, change, ZERO, shift);
+            all.push(hypothesis.mended_by(mend));
         }
     }
     all
@@ -78,7 +77,7 @@ fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
 /// A joint with another zero, or with another zero and sign.
 fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
     let theta = format!("{}.theta", inputs.chain.joint_names()[j]);
-    let subject = joint_label(inputs, j);
+    let (subject, n) = (joint_label(inputs, j), inputs.chain.joint_names().len());
     let mut all = Vec::new();
     match inputs.chain.parameters().iter().find(|p| p.name == theta) {
         Some(p) => all.extend(ZEROS_DEG.iter().map(|start_deg| {
@@ -87,6 +86,7 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
             let hypothesis = Hypothesis::new(Code::JointZero, subject.clone(), change, ZERO, move |i| {
                 i.changes.push(Change { plus, ..widen_bounds(&name) });
             });
+            let hypothesis = Hypothesis { mending: Some(Mending::Zero(j)), ..hypothesis };
             hypothesis.estimating(Freedom::Number, vec![Estimated::of(p, FAR_ZERO_RAD)])
         })),
         // Where no parameter is the zero of the joint, its readings are shifted.
@@ -94,23 +94,30 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
             let subject = subject.clone();
             all.extend(Hypothesis::of_each(&SHIFTS_DEG, 0.0, FAR_ZERO_RAD.to_degrees(), move |deg| {
                 let change = format!("the zero of {subject} moved by {deg:.2} deg");
-                Hypothesis::new(Code::JointZero, subject.clone(), change, ZERO, move |i| {
-                    i.each_dwell(|d| shift_reading(d, j, deg.to_radians()));
-                })
+                let shift = move |i: &mut Inputs| i.each_dwell(|d| shift_reading(d, j, deg.to_radians()));
+                let hypothesis = Hypothesis::new(Code::JointZero, subject.clone(), change, ZERO, shift);
+                hypothesis.mended_by(Mend::of_reading(j, n, 1.0, deg.to_radians()))
             }));
         }
     }
     // No shift undoes another sign.
     all.extend(Hypothesis::of_each(&SHIFTS_DEG, f64::INFINITY, FAR_ZERO_RAD.to_degrees(), move |deg| {
         let change = format!("the sign of {subject} reversed and {deg:.2} deg added to it");
-        Hypothesis::new(Code::JointSign, subject.clone(), change, SIGN, move |i| {
-            i.each_dwell(|d| {
-                scale_reading(d, j, -1.0);
-                shift_reading(d, j, deg.to_radians());
-            });
-        })
+        reversed_and_moved((subject.clone(), n), j, change, deg.to_radians())
     }));
     all
+}
+
+/// The sign of a joint reversed and an angle added to its reading; `of` is its label and the number of joints.
+fn reversed_and_moved(of: (String, usize), j: usize, change: String, by_rad: f64) -> Hypothesis {
+    let mend = Mend::of_reading(j, of.1, -1.0, by_rad);
+    let reverse = move |i: &mut Inputs| {
+        i.each_dwell(|d| {
+            scale_reading(d, j, -1.0);
+            shift_reading(d, j, by_rad);
+        });
+    };
+    Hypothesis::new(Code::JointSign, of.0, change, SIGN, reverse).mended_by(mend)
 }
 
 /// A joint that was homed again.
