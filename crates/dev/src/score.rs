@@ -4,10 +4,10 @@ use crate::error::Error;
 use armcal::progress::Progress;
 use armcal::stdout::{print, print_json};
 use armcal_lab::LabError;
-use armcal_lab::scenario::{
-    Design, Scenario, Size, catalogue_families, check_family, family_pairs, null_families, parse_word,
-    uncatalogued_families,
+use armcal_lab::planted::{
+    catalogue_families, check_family, family_pairs, null_families, uncatalogued_families,
 };
+use armcal_lab::scenario::{Design, Scenario, Size, parse_word};
 use armcal_recording::{atomic, may_write_all};
 use armcal_score::{
     Campaign, Judgement, Reliability, Way, check_laws, confusion_page, family_rows, score_scenarios,

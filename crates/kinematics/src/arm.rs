@@ -1,8 +1,7 @@
 //! The model, read and made.
 
 use crate::KinematicsError;
-use crate::motion::Motion;
-use armcal_compensate::{Drive, TargetFrame};
+use armcal_compensate::{Compensator, Drive, TargetFrame};
 use armcal_core::{FeatureId, Unit};
 use armcal_model_file::{StoredArms, StoredModel};
 
@@ -39,7 +38,8 @@ impl CalibratedArm {
         let file = StoredModel::from_json(text)?;
         let models = file.arms()?;
         let arm = CalibratedArm { file, models };
-        Motion::of(&arm, &Conditions::default())?;
+        let (tip, frame, drive) = arm.drive(&Conditions::default())?;
+        Compensator::of_result(&arm.file, &arm.models, (tip, frame), &drive).check(None)?;
         Ok(arm)
     }
 
@@ -66,14 +66,6 @@ impl CalibratedArm {
     /// The effects in the model, as `armcal add` takes them.
     pub fn effects(&self) -> impl Iterator<Item = String> {
         self.models.model.effects().iter().map(|effect| effect.spec.to_string())
-    }
-
-    /// The arm under these conditions, from where its joints come unknown.
-    ///
-    /// # Errors
-    /// A condition that the model does not know, or that is no number.
-    pub fn motion(&self, conditions: &Conditions) -> Result<Motion<'_>, KinematicsError> {
-        Motion::of(self, conditions)
     }
 
     /// The conditions as `armcal compensate` takes them, once they make sense.

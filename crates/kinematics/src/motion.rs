@@ -45,22 +45,28 @@ pub struct Point {
     pub time_s: Option<f64>,
 }
 
-impl<'a> Motion<'a> {
-    pub(crate) fn of(arm: &'a CalibratedArm, asked: &Conditions) -> Result<Motion<'a>, KinematicsError> {
-        let (tip, frame, drive) = arm.drive(asked)?;
-        let compensator = Compensator::of_result(&arm.file, &arm.models, (tip, frame), &drive);
+impl CalibratedArm {
+    /// The arm under these conditions, from where its joints come unknown.
+    ///
+    /// # Errors
+    /// A condition that the model does not know, or that is no number.
+    pub fn motion(&self, conditions: &Conditions) -> Result<Motion<'_>, KinematicsError> {
+        let (tip, frame, drive) = self.drive(conditions)?;
+        let compensator = Compensator::of_result(&self.file, &self.models, (tip, frame), &drive);
         compensator.check(None)?;
         Ok(Motion {
-            arm,
+            arm: self,
             frame,
             tip,
-            held: held_joints(&arm.models.geometry, tip, &drive),
+            held: held_joints(&self.models.geometry, tip, &drive),
             limits: compensator.limits.0.clone(),
-            underway: Underway::from(None, arm.joint_count()),
+            underway: Underway::from(None, self.joint_count()),
             compensator,
         })
     }
+}
 
+impl Motion<'_> {
     /// The arm waits at these readings [rad], from where it came unknown; `None`: nobody knows where it waits.
     ///
     /// # Errors

@@ -5,10 +5,28 @@
 //! of Denavit-Hartenberg numbers only says how to lay the lines out: along an axis by `d`, along the
 //! common normal by `a`, the next axis twisted about that normal by `alpha`.
 
-use crate::config::DhRow;
 use crate::screw::{Line, pose_from_axes, rotate_vector};
 use armcal_core::Pose;
 use nalgebra::{Matrix3, Matrix3xX, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// One row of the table: turn by `theta` about z, go `d` along it, `a` along the new x, twist by `alpha`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DhRow {
+    /// Name of the joint, or of the fixed row.
+    pub name: String,
+    /// Whether a joint angle is added to `theta`.
+    pub joint: bool,
+    /// Angle at joint zero [deg].
+    pub theta_deg: f64,
+    /// Offset along the axis [m].
+    pub d_m: f64,
+    /// Length of the common normal [m].
+    pub a_m: f64,
+    /// Twist [deg].
+    pub alpha_deg: f64,
+}
 
 /// An arm at rest in its zero position, in its base frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,6 +46,18 @@ pub struct AxisArm {
 pub struct OutOfReach {
     /// How far the tip stays away from the target [m].
     pub short_by_m: f64,
+}
+
+impl DhRow {
+    /// `theta` [rad].
+    pub fn theta_rad(&self) -> f64 {
+        self.theta_deg.to_radians()
+    }
+
+    /// `alpha` [rad].
+    pub fn alpha_rad(&self) -> f64 {
+        self.alpha_deg.to_radians()
+    }
 }
 
 impl AxisArm {

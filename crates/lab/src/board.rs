@@ -2,7 +2,7 @@
 
 use crate::random::{Purpose, Stream};
 use crate::screw::{Line, pose_from_axes, rotate_vector};
-use crate::{LabError, config};
+use crate::{LabError, checks};
 use armcal_core::Pose;
 use armcal_recording::input;
 use nalgebra::Vector3;
@@ -69,11 +69,11 @@ struct CavityTable {
 impl Board {
     /// Reads a board file and machines one such board: every cavity off by its tolerance, the file's or `true_mm`.
     pub fn machine(path: &Path, seed: u64, true_mm: Option<f64>) -> Result<Board, LabError> {
-        let file: BoardFile = config::parse_toml("board file", &read_drawing(path)?, path)?;
-        config::check_not_negative("cavity_sigma_mm", file.cavity_sigma_mm)?;
-        config::check_not_negative("seat_sigma_mm", file.seat_sigma_mm)?;
+        let file: BoardFile = checks::parse_toml("board file", &read_drawing(path)?, path)?;
+        checks::check_not_negative("cavity_sigma_mm", file.cavity_sigma_mm)?;
+        checks::check_not_negative("seat_sigma_mm", file.seat_sigma_mm)?;
         if file.cavities.is_empty() {
-            return Err(config::value_error("cavities", format!("{} has none", path.display())));
+            return Err(checks::value_error("cavities", format!("{} has none", path.display())));
         }
         let tolerance_mm = true_mm.unwrap_or(file.cavity_sigma_mm);
         let mut tolerance = Stream::new(seed, Purpose::Board, 0);
@@ -102,7 +102,7 @@ impl Board {
             return if roll_deg == 0.0 && pitch_deg == 0.0 {
                 Ok(Pose::identity())
             } else {
-                Err(config::value_error(
+                Err(checks::value_error(
                     "recordings",
                     "asks for a tilt, but the board file has no [mechanism]".into(),
                 ))
@@ -125,7 +125,7 @@ impl Board {
             if angle.is_nan() || angle.abs() > limit {
                 let why =
                     format!("recording `{recording}`: the mechanism stops at {limit} deg, asked for {angle}");
-                return Err(config::value_error(&format!("recordings.{axis}_deg"), why));
+                return Err(checks::value_error(&format!("recordings.{axis}_deg"), why));
             }
         }
         Ok(())
@@ -153,7 +153,7 @@ impl TiltMechanism {
         let line = |key: &str, axis: [f64; 3]| {
             let direction = Vector3::from(axis);
             if !direction.iter().all(|v| v.is_finite()) || direction.norm() < 1e-6 {
-                return Err(config::value_error(&format!("mechanism.{key}"), "is not a direction".into()));
+                return Err(checks::value_error(&format!("mechanism.{key}"), "is not a direction".into()));
             }
             Ok(Line { point_m: pivot, direction: direction.normalize() })
         };

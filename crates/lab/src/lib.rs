@@ -11,7 +11,7 @@
 //! | watch | [`sensors`] | counts, camera noise, occlusion, clocks, transport |
 //! | write | [`record`], [`truth`] | ROS 2 messages in MCAP; what was true, for assertions only |
 //!
-//! [`observe`] goes the same way without streams, one reading a dwell, in milliseconds. [`scenario`] draws rigs with
+//! [`observe`] goes the same way without streams, one reading a dwell, in milliseconds. [`planted`] draws rigs with
 //! one thing hidden, and seals them: recordings in one folder, the truth in another. [`pair`] joins the tips of two arms.
 //!
 //! The lab shares no formula with the models that are fitted to its recordings: it lays joint axes out as
@@ -22,6 +22,7 @@
 
 pub mod arm;
 pub mod board;
+mod checks;
 pub mod commands;
 pub mod config;
 pub mod engine;
@@ -31,6 +32,7 @@ pub mod mechanism;
 pub mod mechanisms;
 pub mod pair;
 pub mod plan;
+pub mod planted;
 pub mod quick;
 pub mod random;
 pub mod record;
@@ -179,7 +181,7 @@ fn simulate_recording(
     if session.trace.duration_s() > config.interval_s && recording + 1 < config.recordings.len() {
         let took_s = session.trace.duration_s().ceil();
         let why = format!("is {}, but a recording takes {took_s} s", config.interval_s);
-        return Err(config::value_error("interval_s", why));
+        return Err(checks::value_error("interval_s", why));
     }
     let log = sensors::record_session(config, recording, &session);
     let occlusions = log.occlusions.clone();

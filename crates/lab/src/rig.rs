@@ -1,10 +1,10 @@
 //! The rig of one seed: what was designed, and what was built.
 
 use crate::LabError;
-use crate::arm::AxisArm;
+use crate::arm::{AxisArm, DhRow};
 use crate::board::Board;
 use crate::commands::Commands;
-use crate::config::{ArmConfig, DeviationConfig, DhRow, LabConfig};
+use crate::config::{ArmConfig, DeviationConfig, LabConfig};
 use crate::random::{Purpose, Stream};
 use armcal_core::Pose;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};

@@ -1,8 +1,9 @@
 //! One recording from start to end, told in order: home, a fast sweep, the cavities, free poses, home.
 
 use crate::LabError;
+use crate::checks::value_error;
 use crate::commands::Commands;
-use crate::config::{LabConfig, StopConfig, value_error};
+use crate::config::{LabConfig, StopConfig};
 use crate::engine::{Engine, Pace};
 use crate::mechanism::Mechanism;
 use crate::plan::{Plan, Visit};

@@ -1,6 +1,7 @@
 //! The sealed truth of a session. Only assertions read it.
 
-use crate::config::{DhRow, LabConfig};
+use crate::arm::DhRow;
+use crate::config::LabConfig;
 use crate::rig::Rig;
 use crate::scenario::{Hidden, Scenario};
 use crate::sensors::gauge::Standing;

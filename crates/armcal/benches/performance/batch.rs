@@ -3,7 +3,8 @@
 use crate::child::{Cost, armcal};
 use crate::page::{Bar, Section, Table, seconds};
 use crate::{Options, Result};
-use armcal_lab::scenario::{Design, Scenario, seal};
+use armcal_lab::planted::seal;
+use armcal_lab::scenario::{Design, Scenario};
 use rayon::prelude::*;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,8 @@
 use crate::child::armcal;
 use crate::page::{Bar, Section, Table};
 use crate::{Options, Result, recordings};
-use armcal_lab::scenario::{Design, Scenario, seal};
+use armcal_lab::planted::seal;
+use armcal_lab::scenario::{Design, Scenario};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 

@@ -2,7 +2,7 @@
 
 use crate::causes::{Cause, find_cause};
 use crate::run::{Place, Said, Statement};
-use crate::{Draw, Error, Kind, Rig, run};
+use crate::{Draw, Error, Kind, Rig, Session, run};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -70,7 +70,7 @@ pub struct Case {
 
 /// Makes one mistake on one rig, runs the program on it in `folder`, and judges.
 pub fn run_case(armcal: &Path, kind: &Kind, rig: Rig, seed: u64, folder: &Path) -> Result<Case, Error> {
-    let mut session = rig.session(seed, kind.name)?;
+    let mut session = Session::sound(rig, seed, kind.name)?;
     let about = kind.make(&mut session, &mut Draw::new(seed, kind.name, rig.word()))?;
     let said = run::run(armcal, &session, folder)?;
     let (reported, judgement) = judge(&said, kind.cause, &about);

@@ -1,6 +1,6 @@
 //! Setup mistakes and faults as labs make them, and a judge of what `armcal run` says to them.
 //!
-//! `rigs (a sound session) -> kinds (one mistake made in it) -> run (the program itself) -> judge (its outputs only) -> table`
+//! `rigs -> session (sound) -> kinds (one mistake made in it) -> run (the program itself) -> judge (its outputs only) -> table`
 //!
 //! Nothing here knows how the program looks for mistakes. Sessions come from the virtual lab, or of the six-axis arm
 //! from [`rigs::six_axis`], and the mistakes are made where labs make them: in the messages of a recording, in its

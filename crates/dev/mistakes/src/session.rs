@@ -1,9 +1,9 @@
 //! A session: recordings as messages, with the texts of pipeline, arm and board; and its way to disk.
 
-use crate::rigs::{Rig, Source};
-use crate::{Error, rigs};
-use armcal_lab::record;
-use armcal_lab::sensors::{Log, Message, Payload};
+use crate::rigs::{Body, JOINTS, Recorded, Rig, Source, six_axis, table};
+use crate::{Error, draw, rigs};
+use armcal_lab::sensors::{Message, Payload};
+use armcal_lab::{LabConfig, Nominal, board, record};
 use nalgebra::{Quaternion, Vector3};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -27,26 +27,6 @@ pub struct Session {
     pub damage: Vec<(usize, Damage)>,
 }
 
-/// One recording.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Recorded {
-    /// Its name; the file is `<name>.mcap`.
-    pub name: String,
-    /// Its messages, in the order in which they are written.
-    pub log: Log,
-    /// Rests of the arm, in order of time.
-    pub rests: Vec<Rest>,
-}
-
-/// One rest, on the robot's clock.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rest {
-    /// Start [ns].
-    pub start_ns: i64,
-    /// End [ns].
-    pub end_ns: i64,
-}
-
 /// What happens to the bytes of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Damage {
@@ -56,19 +36,6 @@ pub enum Damage {
     Zeros(f64, f64),
     /// Nothing is there.
     Emptied,
-}
-
-/// A tracked body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Body {
-    /// Tool or flange.
-    Tip,
-    /// The robot's base.
-    Base,
-    /// The calibration board.
-    Table,
-    /// A body that stands still in the room; in no pipeline.
-    Still,
 }
 
 /// Where in the session a message is.
@@ -82,10 +49,34 @@ pub struct At {
     pub share: f64,
 }
 
-/// Topic of the joint states on every rig.
-pub const JOINTS: &str = "/joint_states";
-
 impl Session {
+    /// A sound session, of a rig and with noise of the case's own.
+    pub fn sound(rig: Rig, seed: u64, case: &str) -> Result<Session, Error> {
+        let seed = draw::case_seed(seed, case, rig.word());
+        match rig {
+            Rig::Table | Rig::Sockets => Session::of_lab(rig, table::small_lab(seed)?),
+            Rig::Poses => Session::of_six_axis(six_axis::Lab::new(seed)),
+        }
+    }
+
+    /// What a laboratory records, and the texts with which its recordings are calibrated.
+    pub fn of_lab(rig: Rig, config: LabConfig) -> Result<Session, Error> {
+        let recordings = table::record(rig, &config)?;
+        let pipeline = parse_toml("pipeline", &table::pipeline_toml(rig, &config))?;
+        let arm = parse_toml("arm", &Nominal::dh_toml(&config))?;
+        let board = Some(parse_toml("board", board::PAPER)?);
+        let source = Source::Lab(Box::new(config));
+        Ok(Session { rig, source, recordings, pipeline, arm, board, damage: Vec::new() })
+    }
+
+    /// The same of the six-axis arm.
+    pub fn of_six_axis(lab: six_axis::Lab) -> Result<Session, Error> {
+        let recordings = lab.record();
+        let pipeline = parse_toml("pipeline", &six_axis::pipeline_toml(&recordings))?;
+        let (arm, source) = (parse_toml("arm", six_axis::ARM)?, Source::SixAxis(lab));
+        Ok(Session { rig: Rig::Poses, source, recordings, pipeline, arm, board: None, damage: Vec::new() })
+    }
+
     /// Names of the joints, in the order of the arm.
     pub fn joint_names(&self) -> Vec<String> {
         self.source.joint_names()
@@ -243,6 +234,11 @@ impl Damage {
 pub fn stamp_range_ns(messages: &[Message]) -> Option<(i64, i64)> {
     let stamps = || messages.iter().map(|m| m.stamp_ns);
     Some((stamps().min()?, stamps().max()?))
+}
+
+/// A shipped text as a table.
+fn parse_toml(what: &'static str, text: &str) -> Result<Table, Error> {
+    text.parse().map_err(|source| Error::Toml { what, source: Box::new(source) })
 }
 
 fn write_toml(folder: &Path, name: &'static str, table: &Table) -> Result<PathBuf, Error> {

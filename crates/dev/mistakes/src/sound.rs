@@ -1,10 +1,11 @@
 //! Sound recordings, half of them with a physical effect hidden in the rig: nothing is wrong with their setup.
 
 use crate::judge::{NOTHING, SHOWN};
-use crate::rigs::{Hidden, session_of, six_axis};
+use crate::rigs::{Hidden, six_axis};
 use crate::run::{Place, Said};
 use crate::{Draw, Error, Rig, Session, draw, run};
-use armcal_lab::scenario::{Design, Scenario, catalogue_families};
+use armcal_lab::planted::catalogue_families;
+use armcal_lab::scenario::{Design, Scenario};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -51,20 +52,20 @@ fn draw_session(number: usize, seed: u64) -> Result<(Rig, String, Session), Erro
     let case = format!("sound {number}");
     let mut draw = Draw::new(seed, &case, rig.word());
     if (number / 3).is_multiple_of(2) {
-        return Ok((rig, "nothing".to_owned(), rig.session(seed, &case)?));
+        return Ok((rig, "nothing".to_owned(), Session::sound(rig, seed, &case)?));
     }
     let seed = draw::case_seed(seed, &case, rig.word());
     if rig == Rig::Poses {
         let hidden = Hidden::draw(&mut draw);
         let lab = six_axis::Lab { hidden: Some(hidden), ..six_axis::Lab::new(seed) };
-        return Ok((rig, hidden.word().to_owned(), six_axis::session(lab)?));
+        return Ok((rig, hidden.word().to_owned(), Session::of_six_axis(lab)?));
     }
     let physical = |family: &&str| !FAULTS.iter().any(|fault| family.starts_with(fault));
     let families: Vec<&str> = catalogue_families().into_iter().filter(physical).collect();
     let family = families[draw.pick(families.len())];
     let design = [Design::ThreeTiltsOnePass, Design::ThreeTiltsBothWays, Design::FreePoses][draw.pick(3)];
     let config = Scenario::new(family, design, seed).plant()?.config;
-    Ok((rig, family.to_owned(), session_of(rig, config)?))
+    Ok((rig, family.to_owned(), Session::of_lab(rig, config)?))
 }
 
 fn false_alarms(said: &Said, hidden: &str) -> Vec<String> {

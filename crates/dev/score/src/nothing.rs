@@ -4,7 +4,8 @@ use super::interval::Share;
 use super::judge::NEAR_FLOOR;
 use super::{Judgement, Scored};
 use armcal_diagnose::Verdict;
-use armcal_lab::scenario::{Hidden, null_families};
+use armcal_lab::planted::null_families;
+use armcal_lab::scenario::Hidden;
 use std::fmt::Write as _;
 
 /// What was said where nothing listed was hidden, for each kind of noise.

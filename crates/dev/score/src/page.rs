@@ -4,7 +4,7 @@ use super::interval::Share;
 use super::judge::{AT_FLOOR, DWELLS};
 use super::table::{JUDGEMENTS, describe_answer};
 use super::{Judgement, Reliability, Row, Scored, family_rows, nothing};
-use armcal_lab::scenario;
+use armcal_lab::planted::{null_families, uncatalogued_families};
 use armcal_result::VERSION;
 use std::fmt::Write as _;
 
@@ -37,8 +37,8 @@ enum Kind {
 fn kind_of_family(family: &str) -> Kind {
     match family {
         _ if family.contains('+') => Kind::Together,
-        _ if scenario::null_families().contains(&family) => Kind::Nothing,
-        _ if scenario::uncatalogued_families().contains(&family) => Kind::Outside,
+        _ if null_families().contains(&family) => Kind::Nothing,
+        _ if uncatalogued_families().contains(&family) => Kind::Outside,
         _ => Kind::Listed,
     }
 }

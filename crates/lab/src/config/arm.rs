@@ -1,7 +1,8 @@
 //! The arm: its nominal geometry, how far the built one deviates, its drives.
 
-use super::{check_not_negative, check_positive, value_error};
 use crate::LabError;
+use crate::arm::DhRow;
+use crate::checks::{check_not_negative, check_positive, value_error};
 use serde::{Deserialize, Serialize};
 
 /// The arm as designed, and by how much the built one may differ.
@@ -18,24 +19,6 @@ pub struct ArmConfig {
     pub tip_kg: f64,
     /// Where the arm waits before and after the task [deg], motor side.
     pub home_deg: Vec<f64>,
-}
-
-/// One row of the table: turn by `theta` about z, go `d` along it, `a` along the new x, twist by `alpha`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DhRow {
-    /// Name of the joint, or of the fixed row.
-    pub name: String,
-    /// Whether a joint angle is added to `theta`.
-    pub joint: bool,
-    /// Angle at joint zero [deg].
-    pub theta_deg: f64,
-    /// Offset along the axis [m].
-    pub d_m: f64,
-    /// Length of the common normal [m].
-    pub a_m: f64,
-    /// Twist [deg].
-    pub alpha_deg: f64,
 }
 
 /// Half widths of the uniform distributions from which the built arm is drawn, for every entry of every row.
@@ -69,18 +52,6 @@ pub struct DriveConfig {
     pub kd_nms_rad: f64,
     /// Largest torque of the motor at the joint [N m].
     pub max_torque_nm: f64,
-}
-
-impl DhRow {
-    /// `theta` [rad].
-    pub fn theta_rad(&self) -> f64 {
-        self.theta_deg.to_radians()
-    }
-
-    /// `alpha` [rad].
-    pub fn alpha_rad(&self) -> f64 {
-        self.alpha_deg.to_radians()
-    }
 }
 
 impl Default for ArmConfig {

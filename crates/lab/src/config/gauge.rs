@@ -1,7 +1,8 @@
 //! Instruments that read one length of the tip: a ballbar or a wire to a fixed point, a gauge above a plane.
 
-use super::{check_not_negative, check_positive, check_range, default_placement_mm, value_error};
+use super::default_placement_mm;
 use crate::LabError;
+use crate::checks::{check_not_negative, check_positive, check_range, value_error};
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@ mod gauge;
 mod sensors;
 mod task;
 
-pub use arm::{ArmConfig, DeviationConfig, DhRow, DriveConfig};
+pub use arm::{ArmConfig, DeviationConfig, DriveConfig};
 pub use gauge::{GaugeConfig, GaugeKind};
 pub use sensors::{
     BodyConfig, ClockConfig, EncoderConfig, JointFormat, MarkerConfig, PoseMessage, TableMarkers,
@@ -17,9 +17,9 @@ pub use task::{
 };
 
 use crate::LabError;
+use crate::checks::{check_not_negative, parse_toml, value_error};
 use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -228,55 +228,6 @@ fn default_tilt_deg() -> f64 {
 /// Keys at their defaults stay out of the truth file.
 fn is_default<T: Default + PartialEq>(v: &T) -> bool {
     *v == T::default()
-}
-
-/// Degrees of freedom of Student's t.
-fn check_tail_degrees(key: &str, degrees: f64) -> Result<(), LabError> {
-    if degrees == 0.0 || (degrees.is_finite() && degrees > 2.0) {
-        return Ok(());
-    }
-    Err(value_error(key, "must be 0 (normal) or above 2, where Student's t has a variance".into()))
-}
-
-/// What a TOML file says.
-pub(crate) fn parse_toml<T: DeserializeOwned>(
-    what: &'static str,
-    text: &str,
-    path: &Path,
-) -> Result<T, LabError> {
-    let refused = |source| LabError::Parse { what, path: path.to_owned(), source: Box::new(source) };
-    toml::from_str(text).map_err(refused)
-}
-
-pub(crate) fn value_error(key: &str, why: String) -> LabError {
-    LabError::Value { key: key.to_owned(), why }
-}
-
-pub(crate) fn check_positive(key: &str, v: f64) -> Result<(), LabError> {
-    if v.is_finite() && v > 0.0 { Ok(()) } else { Err(value_error(key, format!("must be above 0, is {v}"))) }
-}
-
-pub(crate) fn check_not_negative(key: &str, v: f64) -> Result<(), LabError> {
-    if v.is_finite() && v >= 0.0 {
-        Ok(())
-    } else {
-        Err(value_error(key, format!("must not be negative, is {v}")))
-    }
-}
-
-pub(crate) fn check_share(key: &str, v: f64) -> Result<(), LabError> {
-    if (0.0..=1.0).contains(&v) {
-        Ok(())
-    } else {
-        Err(value_error(key, format!("must lie between 0 and 1, is {v}")))
-    }
-}
-
-pub(crate) fn check_range(key: &str, [low, high]: [f64; 2]) -> Result<(), LabError> {
-    if low.is_finite() && high.is_finite() && low <= high {
-        return Ok(());
-    }
-    Err(value_error(key, format!("must be [smallest, largest], is [{low}, {high}]")))
 }
 
 #[cfg(test)]

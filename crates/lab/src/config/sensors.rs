@@ -1,7 +1,9 @@
 //! Encoders, motion capture, thermometer, and the clocks and transport of their messages.
 
-use super::{check_not_negative, check_positive, check_range, check_share, check_tail_degrees, value_error};
 use crate::LabError;
+use crate::checks::{
+    check_not_negative, check_positive, check_range, check_share, check_tail_degrees, value_error,
+};
 use serde::{Deserialize, Serialize};
 
 /// Encoders and the joint state topic.

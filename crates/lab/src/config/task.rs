@@ -1,7 +1,9 @@
 //! What the arm does, and how the hand that seats it behaves.
 
-use super::{check_not_negative, check_positive, check_range, check_share, check_tail_degrees, value_error};
 use crate::LabError;
+use crate::checks::{
+    check_not_negative, check_positive, check_range, check_share, check_tail_degrees, value_error,
+};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

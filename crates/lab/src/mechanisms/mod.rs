@@ -93,7 +93,7 @@ pub use zero_slip::ZeroSlip;
 
 use crate::arm::AxisArm;
 use crate::board::Board;
-use crate::config::{check_not_negative, check_positive, value_error};
+use crate::checks::{check_not_negative, check_positive, value_error};
 use crate::mechanism::{Body, Named};
 use crate::{LabError, Mechanism, RigState};
 use armcal_core::Pose;

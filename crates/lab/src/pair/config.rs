@@ -1,12 +1,9 @@
 //! The lab file of two arms: recognised by its `[[arms]]`.
 
-use super::drives::acts_on_drives;
-use super::torso::TorsoConfig;
 use crate::LabError;
-use crate::config::{
-    DeviationConfig, DhRow, EncoderConfig, check_not_negative, check_positive, check_range, parse_toml,
-    value_error,
-};
+use crate::arm::DhRow;
+use crate::checks::{check_not_negative, check_positive, check_range, parse_toml, value_error};
+use crate::config::{DeviationConfig, EncoderConfig};
 use crate::mechanisms::{Keys, MechanismConfig};
 use armcal_core::RollPitchYaw;
 use serde::{Deserialize, Serialize};
@@ -69,6 +66,32 @@ pub struct PairArmConfig {
     /// What is hidden in its drives and encoders; in recordings only ([`super::simulate`]).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mechanisms: Vec<MechanismConfig>,
+}
+
+/// What carries both arms. Their bases are placed on the frame at its tip.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TorsoConfig {
+    /// Its joint, as an arm of one row.
+    pub arm: PairArmConfig,
+    /// Between which angles it is turned [deg].
+    pub range_deg: [f64; 2],
+    /// What cameras see of the tips; nothing by default.
+    pub seen: Option<TipsSeenConfig>,
+}
+
+/// Cameras that see both tips.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TipsSeenConfig {
+    /// A topic a tip.
+    pub topics: [String; 2],
+    /// Frames a second [Hz].
+    pub rate_hz: f64,
+    /// White noise, 1 sigma per axis [mm].
+    pub sigma_mm: f64,
+    /// Where the robot stands in the cameras' frame.
+    pub robot: RollPitchYaw,
 }
 
 /// How the tips are joined.
@@ -177,7 +200,7 @@ impl PairConfig {
 }
 
 impl PairArmConfig {
-    pub(super) fn check(&self, recordings: usize) -> Result<(), LabError> {
+    fn check(&self, recordings: usize) -> Result<(), LabError> {
         let joints = self.rows.iter().filter(|row| row.joint).count();
         for (key, size) in
             [("arms.home_deg", self.home_deg.len()), ("arms.joints.names", self.joints.names.len())]
@@ -207,6 +230,46 @@ impl PairArmConfig {
         check_not_negative("arms.placement_sigma_deg", self.placement_sigma_deg)?;
         self.joints.check()
     }
+}
+
+impl TorsoConfig {
+    fn check(&self, recordings: usize) -> Result<(), LabError> {
+        check_range("torso.range_deg", self.range_deg)?;
+        if self.arm.home_deg.len() != 1 {
+            return Err(value_error("torso.arm.home_deg", "is not of one joint; a torso has one".into()));
+        }
+        if let Some(seen) = &self.seen {
+            check_positive("torso.seen.rate_hz", seen.rate_hz)?;
+            check_not_negative("torso.seen.sigma_mm", seen.sigma_mm)?;
+        }
+        self.arm.check(recordings)
+    }
+}
+
+/// Refuses what acts on anything but drives and encoders: the hand leads rigid arms.
+fn acts_on_drives(mechanism: &MechanismConfig) -> Result<(), LabError> {
+    use MechanismConfig::{
+        AxisTilt, AxisWobble, BaseCompliance, BoardScale, Bump, CameraDistortion, CameraScale, FrameDrift,
+        LinkBending, RoomTemperature, ThermalGrowth, Twist, WarmUp,
+    };
+    let elsewhere = matches!(
+        mechanism,
+        AxisTilt(_)
+            | AxisWobble(_)
+            | BaseCompliance(_)
+            | BoardScale(_)
+            | Bump(_)
+            | CameraDistortion(_)
+            | CameraScale(_)
+            | FrameDrift(_)
+            | LinkBending(_)
+            | RoomTemperature(_)
+            | ThermalGrowth(_)
+            | Twist(_)
+            | WarmUp(_)
+    );
+    let why = "acts on links, frames or cameras; an arm of a pair takes what is in its drives and encoders";
+    if elsewhere { Err(value_error("arms.mechanisms", why.to_owned())) } else { Ok(()) }
 }
 
 fn default_link_kg() -> f64 {

@@ -1,8 +1,7 @@
 //! The drives of one arm of a pair: what the encoders read while a hand leads the links.
 
 use super::{BuiltArm, PairArmConfig};
-use crate::mechanisms::MechanismConfig;
-use crate::{LabError, Mechanism, RigState};
+use crate::{Mechanism, RigState};
 use nalgebra::Vector3;
 
 /// Gravity in the world [m/s^2].
@@ -52,30 +51,4 @@ impl<'a> Drives<'a> {
         self.mechanisms.iter().for_each(|m| m.distort_encoder(&now, &mut reading_rad));
         reading_rad
     }
-}
-
-/// Refuses what acts on anything but drives and encoders: the hand leads rigid arms.
-pub(super) fn acts_on_drives(mechanism: &MechanismConfig) -> Result<(), LabError> {
-    use MechanismConfig::{
-        AxisTilt, AxisWobble, BaseCompliance, BoardScale, Bump, CameraDistortion, CameraScale, FrameDrift,
-        LinkBending, RoomTemperature, ThermalGrowth, Twist, WarmUp,
-    };
-    let elsewhere = matches!(
-        mechanism,
-        AxisTilt(_)
-            | AxisWobble(_)
-            | BaseCompliance(_)
-            | BoardScale(_)
-            | Bump(_)
-            | CameraDistortion(_)
-            | CameraScale(_)
-            | FrameDrift(_)
-            | LinkBending(_)
-            | RoomTemperature(_)
-            | ThermalGrowth(_)
-            | Twist(_)
-            | WarmUp(_)
-    );
-    let why = "acts on links, frames or cameras; an arm of a pair takes what is in its drives and encoders";
-    if elsewhere { Err(crate::config::value_error("arms.mechanisms", why.to_owned())) } else { Ok(()) }
 }

@@ -9,15 +9,13 @@ mod config;
 mod drives;
 mod motion;
 mod recorded;
-mod torso;
 mod truth;
 
-pub use config::{JoinConfig, PairArmConfig, PairConfig, PairTaskConfig};
-pub use torso::{TipsSeenConfig, TorsoConfig};
+pub use config::{JoinConfig, PairArmConfig, PairConfig, PairTaskConfig, TipsSeenConfig, TorsoConfig};
 pub use truth::{PairArmTruth, PairDwellTruth, PairRecordingTruth, PairTruth};
 
-use crate::arm::AxisArm;
-use crate::config::DhRow;
+use crate::arm::{AxisArm, DhRow};
+use crate::checks::value_error;
 use crate::quick::mean_encoder_readings;
 use crate::random::{Purpose, Stream};
 use crate::rig::{build_rows, small_motion};
@@ -81,7 +79,7 @@ pub fn observe(config: &PairConfig) -> Result<ObservedPair, LabError> {
     config.check()?;
     if config.carriers().iter().any(|arm| !arm.mechanisms.is_empty()) {
         let why = "what is in the drives depends on the way to a rest: simulate a recording".to_owned();
-        return Err(crate::config::value_error("arms.mechanisms", why));
+        return Err(value_error("arms.mechanisms", why));
     }
     let pair = Pair::build(config);
     let mut truth = PairTruth::of_pair(config, &pair);

@@ -110,8 +110,7 @@ impl Motion {
             torso_rad: [0.0; 2],
             moves: false,
         }];
-        let turns = |torso: &TorsoConfig| torso.turns_rad(config.seed, recording, task.poses);
-        let turns_rad = config.torso.as_ref().map_or_else(|| vec![0.0; task.poses], turns);
+        let mut turning = Stream::new(config.seed, Purpose::Torso, recording);
         let mut before: Option<Pose> = None;
         let add = |phases: &mut Vec<Phase>,
                    last_s: f64,
@@ -123,7 +122,9 @@ impl Motion {
             let (end_s, torso_rad) = (start_s + last_s, [last.torso_rad[1], turn_rad]);
             phases.push(Phase { start_s, end_s, held, from_rad, to_rad: to_rad.clone(), torso_rad, moves });
         };
-        for turn_rad in turns_rad {
+        for _ in 0..task.poses {
+            let turn = |torso: &TorsoConfig| turning.uniform(torso.range_deg).to_radians();
+            let turn_rad = config.torso.as_ref().map_or(0.0, turn);
             let next = draw_pose(config, pair, recording, &mut draw, before.as_ref(), &home)?;
             let way = before.as_ref().map(|(grip, _)| [*grip, next.0]);
             add(&mut phases, pauses.uniform(task.move_s), way, (&next.1, turn_rad), true);

@@ -1,4 +1,4 @@
-//! How the arm moves, who moves it, and how bad the noise is.
+//! How the arm moves, and who moves it.
 
 use crate::config::{LabConfig, Order, PassConfig, RecordingConfig};
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,7 @@ impl Design {
     }
 
     /// Lets the rig move this way.
-    pub(super) fn apply(self, config: &mut LabConfig, driving: Driving) {
+    pub(crate) fn apply(self, config: &mut LabConfig, driving: Driving) {
         let pass = |order| PassConfig { order, share: 1.0 };
         config.task.passes = match self {
             Design::TrackedOnly => Vec::new(),
@@ -100,38 +100,4 @@ impl Design {
         config.recordings =
             loads.iter().flat_map(|load| tilts.iter().map(move |tilt| recording(tilt, load))).collect();
     }
-}
-
-/// The ways of hiding nothing.
-pub(super) const NOTHING: [&str; 6] = [
-    "nothing",
-    "nothing:white",
-    "nothing:cavities",
-    "nothing:autocorrelated",
-    "nothing:heavy_tails",
-    "nothing:swaps",
-];
-
-/// Makes the noise what a name of [`NOTHING`] says; whether it is one.
-pub(super) fn worsen_noise(name: &str, config: &mut LabConfig) -> bool {
-    match name {
-        "nothing" => {}
-        "nothing:white" => config.board.true_cavity_sigma_mm = Some(0.0),
-        // Three times the tolerance that the board file declares.
-        "nothing:cavities" => config.board.true_cavity_sigma_mm = Some(0.15),
-        "nothing:autocorrelated" => {
-            config.hand.seat_correlation = 0.7;
-            (config.vicon.correlated_share, config.vicon.correlation_s) = (0.5, 15.0);
-        }
-        "nothing:heavy_tails" => {
-            config.hand.seat_tail_degrees = 3.0;
-            config.vicon.tail_degrees = 3.0;
-        }
-        "nothing:swaps" => {
-            config.vicon.swaps_per_minute = 0.5;
-            config.hand.seat_tail_degrees = 3.0;
-        }
-        _ => return false,
-    }
-    true
 }

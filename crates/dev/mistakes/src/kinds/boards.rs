@@ -94,7 +94,7 @@ fn another_make(session: &mut Session, _: &mut Draw) {
 /// The plate with the markers was knocked between recordings; the board stands where it stood.
 fn slide_board(session: &mut Session, draw: &mut Draw) {
     let offset = draw.direction() * draw.uniform(0.008, 0.025);
-    session.poses(crate::session::Body::Table, |at, p, _| {
+    session.poses(crate::rigs::Body::Table, |at, p, _| {
         if at.recording >= 1 {
             *p += offset;
         }

@@ -1,8 +1,8 @@
 //! Stamps: of another clock, in another unit, late, repeated, out of order.
 
 use super::{ALL, Kind, SEEN, whole};
-use crate::Draw;
-use crate::session::{Body, JOINTS, Session};
+use crate::rigs::{Body, JOINTS};
+use crate::{Draw, Session};
 
 pub const KINDS: &[Kind] = &[
     whole("joint-clock-set-forward", "clock-set", ALL, |s, d| joint_clock_set(s, d, 1.0)),

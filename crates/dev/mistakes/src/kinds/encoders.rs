@@ -1,8 +1,8 @@
 //! Encoders and drivers that fail, and readings that are no readings.
 
 use super::{ALL, Kind, change_readings, joint, set_points, whole};
-use crate::Draw;
-use crate::session::{Rest, Session};
+use crate::rigs::Rest;
+use crate::{Draw, Session};
 
 pub const KINDS: &[Kind] = &[
     joint("joint-frozen-throughout", "joint-stuck", 0, |s, _, j| freeze_joint(s, j, 0.0)),

@@ -2,7 +2,8 @@
 
 use super::{ALL, Kind, SEEN, whole};
 use crate::Draw;
-use crate::session::{Body, Damage, JOINTS, Session};
+use crate::rigs::{Body, JOINTS};
+use crate::session::{Damage, Session};
 use armcal_lab::sensors::Message;
 use nalgebra::{Quaternion, Vector3};
 use toml::Value;

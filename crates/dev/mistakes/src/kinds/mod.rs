@@ -139,8 +139,8 @@ mod tests {
     #[test]
     fn every_kind_changes_the_session_the_same_way_each_time() {
         for rig in Rig::ALL {
-            let sound = rig.session(3, "test").unwrap();
-            assert_eq!(sound, rig.session(3, "test").unwrap(), "{rig:?} is not the same twice");
+            let sound = Session::sound(rig, 3, "test").unwrap();
+            assert_eq!(sound, Session::sound(rig, 3, "test").unwrap(), "{rig:?} is not the same twice");
             for kind in kinds().iter().filter(|kind| kind.rigs.contains(&rig)) {
                 let make = |seed| {
                     let mut session = sound.clone();

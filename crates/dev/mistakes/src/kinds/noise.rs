@@ -1,9 +1,8 @@
 //! Noise that is not what is declared.
 
 use super::{BOARD, Kind, POSES, SEEN, about_anything, kind, whole};
-use crate::rigs::{Source, session_of};
-use crate::session::{Body, Session};
-use crate::{Draw, Error};
+use crate::rigs::{Body, Source};
+use crate::{Draw, Error, Session};
 use toml::Value;
 
 pub const KINDS: &[Kind] = &[
@@ -31,7 +30,7 @@ fn wear_cavities(session: &mut Session, draw: &mut Draw) -> Result<Vec<String>, 
     let Source::Lab(config) = &session.source else { return about_anything() };
     let mut config = config.clone();
     config.board.true_cavity_sigma_mm = Some(draw.uniform(0.4, 0.9));
-    *session = session_of(session.rig, *config)?;
+    *session = Session::of_lab(session.rig, *config)?;
     about_anything()
 }
 

@@ -1,9 +1,8 @@
 //! Tracked poses in other conventions, units and roles.
 
 use super::{Kind, POSES, SEEN, TABLE, whole};
-use crate::Draw;
-use crate::rigs::Rig;
-use crate::session::{Body, Session};
+use crate::rigs::{Body, Rig};
+use crate::{Draw, Session};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 pub const KINDS: &[Kind] = &[

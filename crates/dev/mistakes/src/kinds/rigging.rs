@@ -1,9 +1,8 @@
 //! What was moved, exchanged or said wrongly about the cell.
 
 use super::{ALL, BOARD, Kind, SEEN, TABLE, about_anything, kind, whole};
-use crate::rigs::{Rig, Source, session_of};
-use crate::session::{Body, Session};
-use crate::{Draw, Error, draw};
+use crate::rigs::{Body, Rig, Source};
+use crate::{Draw, Error, Session, draw};
 use armcal_lab::scenario::{Design, Scenario, Size};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use toml::Value;
@@ -166,7 +165,7 @@ fn add_load(session: &mut Session, _: &mut Draw) -> Result<Vec<String>, Error> {
     let scenario = Scenario { size: Size::Large, ..Scenario::new("compliance", Design::Load, seed) };
     let mut lab = scenario.plant()?.config;
     lab.recordings.truncate(4);
-    *session = session_of(session.rig, lab)?;
+    *session = Session::of_lab(session.rig, lab)?;
     for entry in session.entries().iter_mut().filter_map(Value::as_table_mut) {
         entry.remove("load_kg");
     }

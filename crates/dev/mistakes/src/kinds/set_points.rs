@@ -1,7 +1,7 @@
 //! What the controller asked of the joints, taken for what the encoders read.
 
-use crate::Draw;
-use crate::session::{JOINTS, Rest, Session};
+use crate::rigs::{JOINTS, Rest};
+use crate::{Draw, Session};
 use armcal_lab::sensors::{Kind, Message, Payload};
 
 /// Set-points under the topic of the readings.

@@ -1,17 +1,15 @@
-//! Three sound rigs.
+//! Three sound rigs, and what they record.
 
 mod hidden;
 pub mod six_axis;
-mod table;
+pub mod table;
 
-use crate::session::{Body, JOINTS, Recorded, Session};
-use crate::{Error, draw};
+use crate::Error;
 use armcal_lab::LabConfig;
+use armcal_lab::sensors::Log;
 use serde::{Deserialize, Serialize};
-use toml::Table;
 
 pub use hidden::Hidden;
-pub use table::{session_of, small_lab};
 
 /// A rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,15 +44,26 @@ impl Rig {
             known: Rig::ALL.map(Rig::word).join(", "),
         })
     }
+}
 
-    /// A sound session, of a rig and with noise of the case's own.
-    pub fn session(self, seed: u64, case: &str) -> Result<Session, Error> {
-        let seed = draw::case_seed(seed, case, self.word());
-        match self {
-            Rig::Table | Rig::Sockets => session_of(self, small_lab(seed)?),
-            Rig::Poses => six_axis::session(six_axis::Lab::new(seed)),
-        }
-    }
+/// One recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recorded {
+    /// Its name; the file is `<name>.mcap`.
+    pub name: String,
+    /// Its messages, in the order in which they are written.
+    pub log: Log,
+    /// Rests of the arm, in order of time.
+    pub rests: Vec<Rest>,
+}
+
+/// One rest, on the robot's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// Start [ns].
+    pub start_ns: i64,
+    /// End [ns].
+    pub end_ns: i64,
 }
 
 /// What makes recordings.
@@ -92,6 +101,19 @@ impl Source {
     }
 }
 
+/// A tracked body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Body {
+    /// Tool or flange.
+    Tip,
+    /// The robot's base.
+    Base,
+    /// The calibration board.
+    Table,
+    /// A body that stands still in the room; in no pipeline.
+    Still,
+}
+
 /// The bodies that a rig's camera sees.
 pub fn bodies(rig: Rig) -> &'static [Body] {
     match rig {
@@ -112,10 +134,8 @@ pub fn body_topic(rig: Rig, body: Body) -> &'static str {
     }
 }
 
-/// A shipped text as a table.
-fn parse_toml(what: &'static str, text: &str) -> Result<Table, Error> {
-    text.parse().map_err(|source| Error::Toml { what, source: Box::new(source) })
-}
+/// Topic of the joint states on every rig.
+pub const JOINTS: &str = "/joint_states";
 
 /// The section of the joints.
 fn joints_toml(names: &[String]) -> String {

@@ -4,9 +4,7 @@
 //! the models that are fitted. The built arm's lines lie a little off the drawn ones.
 
 use super::hidden::Hidden;
-use super::{Rig, Source, body_topic, joints_toml, parse_toml};
-use crate::Error;
-use crate::session::{Body, JOINTS, Recorded, Rest, Session};
+use super::{Body, JOINTS, Recorded, Rest, Rig, body_topic, joints_toml};
 use armcal_lab::hand::minimum_jerk;
 use armcal_lab::random::{Purpose, Stream};
 use armcal_lab::screw::Line;
@@ -15,7 +13,7 @@ use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 /// The manufacturer's table, as shipped.
-const ARM: &str = include_str!("../../../../../pipelines/models/ur10.toml");
+pub const ARM: &str = include_str!("../../../../../pipelines/models/ur10.toml");
 
 /// Names of the joints.
 pub const NAMES: [&str; 6] = [
@@ -228,20 +226,16 @@ impl Path {
     }
 }
 
-/// A sound session.
-pub fn session(lab: Lab) -> Result<Session, Error> {
-    let recordings = lab.record();
+/// The pipeline with which these recordings are calibrated.
+pub fn pipeline_toml(recordings: &[Recorded]) -> String {
     let files: String =
         recordings.iter().map(|r| format!("[[recordings]]\npaths = [\"{}.mcap\"]\n\n", r.name)).collect();
-    let text = format!(
+    format!(
         "name = \"poses\"\n\n{files}{}[streams.tip]\ntopic = \"{}\"\n\n[model]\ndh = \"arm.toml\"\n\n\
          [frames.base]\npose = \"estimated\"\n\n[frames.tip]\npose = \"estimated\"\nat = {{ xyz_m = [0.0, 0.0, 0.1] }}\n\n\
          [observations]\nsensor_sigma_mm = 0.03\nsensor_sigma_deg = 0.003\n\n[fit]\nuse_orientation = true\n\n\
          [holdout]\nkind = \"cavity-folds\"\nk = 5\n",
         joints_toml(&NAMES.map(str::to_owned)),
         body_topic(Rig::Poses, Body::Tip),
-    );
-    let (pipeline, arm) = (parse_toml("pipeline", &text)?, parse_toml("arm", ARM)?);
-    let source = Source::SixAxis(lab);
-    Ok(Session { rig: Rig::Poses, source, recordings, pipeline, arm, board: None, damage: Vec::new() })
+    )
 }

@@ -1,10 +1,9 @@
 //! The paper's rig from the virtual lab, with Vicon or with encoders only.
 
-use super::{Rig, Source, body_topic, joints_toml, parse_toml};
+use super::{Body, JOINTS, Recorded, Rest, Rig, body_topic, joints_toml};
 use crate::Error;
-use crate::session::{Body, JOINTS, Recorded, Rest, Session};
 use armcal_lab::sensors::Log;
-use armcal_lab::{LabConfig, Nominal, board, nothing_hidden};
+use armcal_lab::{LabConfig, board, nothing_hidden};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -17,16 +16,6 @@ pub fn small_lab(seed: u64) -> Result<LabConfig, Error> {
     config.board.file = PathBuf::from(board::BUILTIN);
     config.seed = seed;
     Ok(config)
-}
-
-/// What a laboratory records, and the texts with which its recordings are calibrated.
-pub fn session_of(rig: Rig, config: LabConfig) -> Result<Session, Error> {
-    let recordings = record(rig, &config)?;
-    let pipeline = parse_toml("pipeline", &pipeline_toml(rig, &config))?;
-    let arm = parse_toml("arm", &Nominal::dh_toml(&config))?;
-    let board = Some(parse_toml("board", board::PAPER)?);
-    let source = Source::Lab(Box::new(config));
-    Ok(Session { rig, source, recordings, pipeline, arm, board, damage: Vec::new() })
 }
 
 /// The recordings of a laboratory.
@@ -49,7 +38,8 @@ fn without_camera(mut log: Log) -> Log {
     log
 }
 
-fn pipeline_toml(rig: Rig, config: &LabConfig) -> String {
+/// The pipeline with which its recordings are calibrated.
+pub fn pipeline_toml(rig: Rig, config: &LabConfig) -> String {
     let mut text = format!("name = \"{}\"\n\n", rig.word());
     for recording in &config.recordings {
         // Writing to a string cannot fail.

@@ -1,9 +1,10 @@
 //! The families of the catalogue: what each hides, and what a right answer would be.
 
-use super::{Design, Hidden, Size};
-use crate::config::{LabConfig, value_error};
+use crate::checks::value_error;
+use crate::config::LabConfig;
 use crate::mechanisms::*;
 use crate::random::Stream;
+use crate::scenario::{Design, Hidden, Size};
 use crate::{LabError, observe};
 use nalgebra::Vector3;
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::mechanisms::MechanismConfig;
+use crate::scenario::{Design, Size};
 use armcal_core::Reference;
 
 fn everything() -> Vec<&'static str> {

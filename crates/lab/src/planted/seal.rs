@@ -1,7 +1,8 @@
 //! A scenario on disk: everything the product may see in one folder, the truth elsewhere.
 
-use super::Scenario;
-use crate::config::{LabConfig, value_error};
+use crate::checks::value_error;
+use crate::config::LabConfig;
+use crate::scenario::Scenario;
 use crate::truth::write_json;
 use crate::{
     LabError, Nominal, board, make_folder, may_write, nothing_hidden, simulate_in_memory, write_recordings,
