@@ -1,14 +1,23 @@
 //! An arm, or several side by side: segments, joints, parameters.
 
+mod arms;
+mod dh_toml;
+mod masses;
+mod urdf;
+
 use crate::ModelError;
-use crate::arms::Arm;
-use crate::dh_toml::DhTable;
 use crate::error::most_similar;
-use crate::masses::Masses;
 use crate::segment::{Motion, Segment};
 use crate::tree::{SegmentId, Tree};
-use crate::urdf::UrdfJoint;
 use armcal_core::{Parameter, Unit};
+
+pub use arms::Arm;
+pub use dh_toml::DhRow;
+use dh_toml::DhTable;
+pub use masses::Masses;
+use urdf::UrdfJoint;
+pub(crate) use urdf::with_origins;
+pub use urdf::{check_xml, roll_pitch_yaw_of, three_numbers};
 
 /// A serial arm from base to last link, read from a DH table or a URDF.
 ///

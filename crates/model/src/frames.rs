@@ -56,6 +56,15 @@ pub struct Frames {
     pub boards: Vec<Frame>,
 }
 
+/// The frames of one arm of several.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArmFrames {
+    /// world_from_base.
+    pub base: Frame,
+    /// last link_from_tip.
+    pub tip: Frame,
+}
+
 /// A marker on a link of the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Marker {

@@ -16,15 +16,12 @@
 //! carries these derivatives to the tip, so that nothing is differentiated numerically and no
 //! derivative is written by hand.
 
-mod arms;
 mod chain;
 mod deviation;
-mod dh_toml;
 mod effects;
 mod error;
 mod fixed;
 mod frames;
-mod masses;
 mod measurements;
 mod model;
 mod registry;
@@ -35,32 +32,29 @@ mod skeleton;
 mod still;
 mod tree;
 mod twist;
-mod urdf;
 
 #[cfg(test)]
 mod tests;
 
-pub use arms::{Arm, ArmFrames};
-pub use chain::Chain;
+pub use chain::{Arm, Chain, DhRow, Masses, check_xml, roll_pitch_yaw_of, three_numbers};
 pub use deviation::Deviation;
-pub use dh_toml::DhRow;
 pub use effects::{
     Drivers, EffectKind, EffectSpec, EffectTable, Expression, Family, JointReference, Lookalikes, Offered,
     Override, PlacedEffect, Session, Shape, Since, Target, Toggle, Torque, catalogue, effects_toml, find,
-    is_of_effect, least_dwells, place_and_moment, prelude as effect_prelude, register, tables_toml,
+    is_of_effect, place_and_moment, prelude as effect_prelude, register, tables_toml,
 };
 pub use error::ModelError;
 pub use fixed::{FixedPlace, Length};
-pub use frames::{Frame, Frames, Knowledge, Marker};
-pub use masses::Masses;
+pub use frames::{ArmFrames, Frame, Frames, Knowledge, Marker};
 pub use measurements::{
     AnyMeasurement, DISTANCE, Measurement, MeasurementKind, find_measurement, measurement_kinds,
     register_measurements,
 };
-pub use model::{CarriedMotions, CarriedPoint, LinkFrame, Model, RecordingStart};
+pub use model::{
+    CalibratedOrigins, CarriedMotions, CarriedPoint, LinkFrame, Model, RecordingStart, least_dwells,
+};
 pub use residual::ModelResidual;
 pub use rigid::Scalar;
 pub use segment::Motion;
 pub use skeleton::{Bone, Moving, Place, Skeleton};
 pub use tree::Asked;
-pub use urdf::{CalibratedOrigins, check_xml, roll_pitch_yaw_of, three_numbers};

@@ -1,6 +1,9 @@
 //! Chain and frames together: predicted tip, residual, exact Jacobian.
 
+mod calibrated_urdf;
 mod carried;
+mod declared;
+mod effects;
 mod features;
 mod linearisation;
 mod measured;
@@ -9,18 +12,18 @@ mod predicting;
 mod prediction;
 mod scopes;
 
-use crate::arms::{self, ArmFrames};
-use crate::effects::{Declared, EffectSpec, Effects, NominalPose, PlacedEffect, Session};
+use crate::effects::{Declared, EffectSpec, Effects, NominalArm};
 use crate::error::most_similar;
 use crate::fixed::{FixedPlace, Length, Standing};
 use crate::measurements::find_measurement;
 use crate::rigid::Rigid;
 use crate::segment::{Geometry, Segment};
-use crate::tree::{SegmentId, Tree};
-use crate::{Chain, Frame, Frames, Marker, Masses, ModelError};
-use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference, Unit};
+use crate::tree::{Feature, Tree};
+use crate::{ArmFrames, Chain, Frame, Frames, Marker, Masses, ModelError};
+use armcal_core::{Against, FeatureId, Observation, Parameter, Pose, Reference};
+pub use calibrated_urdf::CalibratedOrigins;
 pub use carried::{CarriedMotions, CarriedPoint};
-use features::Feature;
+pub use effects::least_dwells;
 pub use features::LinkFrame;
 pub use scopes::RecordingStart;
 use scopes::{OwnAsked, Scopes};
@@ -50,7 +53,7 @@ pub struct Model {
     /// What makes the arm differ from the path; nothing, where it is rigid.
     effects: Option<Effects>,
     /// What is known of the parameters of effects, of those that are not in the model too.
-    pub(crate) declared: Arc<[Declared]>,
+    declared: Arc<[Declared]>,
     /// What single recordings have for themselves beside their boards; nothing, where all of them know all.
     scopes: Option<Arc<Scopes>>,
     /// The same, as long as effects are still to be placed.
@@ -120,7 +123,7 @@ impl Model {
         }
         let boards =
             boards.iter().map(place).collect::<Result<Vec<_>, _>>()?.into_iter().enumerate().collect();
-        arms::check_bases(&bases, &parameters)?;
+        check_bases(&bases, &parameters)?;
         check_names(&parameters)?;
         let mut tree = chain.on(bases);
         let mut features = Vec::with_capacity(hung.len());
@@ -289,12 +292,6 @@ impl Model {
         self.boards.len()
     }
 
-    /// Whether the pose of a recording's board is found by the fit, with nothing else known of it.
-    pub(crate) fn board_is_estimated(&self, recording: usize) -> bool {
-        let own = &self.parameters[self.board_parameters(recording)];
-        own.iter().any(|p| p.free && p.prior_sigma.is_none())
-    }
-
     /// world_from_board of a recording, if it has a board.
     pub fn board_in_world(&self, p: &[f64], recording: usize) -> Option<Pose> {
         self.boards.get(&recording).map(|board| Pose::from(&board.transform(p, &[])))
@@ -324,18 +321,13 @@ impl Model {
 
     /// Every length of the chain and of the tips that is not zero: index in the parameter vector, nominal [m].
     pub fn lengths_m(&self) -> Vec<(usize, f64)> {
-        let tips = (0..self.chain.bases()).flat_map(|arm| self.tip_segment(arm).parameters.clone());
-        (0..self.chain.parameters().len())
-            .chain(tips)
-            .map(|index| (index, &self.parameters[index]))
-            .filter(|(_, p)| p.unit == Unit::Metre && p.nominal != 0.0)
-            .map(|(index, p)| (index, p.nominal))
-            .collect()
+        self.nominal_arm().lengths_m()
     }
 
-    /// The segment of an arm's tip.
-    pub(crate) fn tip_segment(&self, arm: usize) -> &Segment {
-        &self.tree.0[self.route(FeatureId(arm)).last().copied().unwrap_or(arm)]
+    /// What effects are placed on.
+    pub(crate) fn nominal_arm(&self) -> NominalArm<'_> {
+        let Model { chain, parameters, tree, features, boards, .. } = self;
+        NominalArm { chain, parameters, tree, features, boards }
     }
 
     /// The tree of the arm.
@@ -343,54 +335,14 @@ impl Model {
         &self.tree
     }
 
-    /// The segment that another hangs on.
-    pub(crate) fn segment_before(&self, segment: SegmentId) -> Option<&Segment> {
-        Some(&self.tree.0[self.tree.0.get(segment)?.parent?])
-    }
-
-    /// The effects, if there are any.
-    pub(crate) fn placed_effects(&self) -> Option<&Effects> {
-        self.effects.as_ref()
-    }
-
-    /// The parameters of the tree (chain, base, tip), which effects may act on.
-    pub(crate) fn is_on_path(&self, index: usize) -> bool {
-        self.tree.0.iter().any(|segment| segment.parameters.contains(&index))
-    }
-
-    /// The nominal arm in a pose.
-    pub(crate) fn nominal_pose(&self, nominal: &[f64], joint_rad: &[f64]) -> NominalPose {
-        let ends: Vec<SegmentId> = self.routes().filter_map(|route| route.last().copied()).collect();
-        NominalPose::of(&self.tree, (self.chain.bases(), &ends), nominal, joint_rad)
-    }
-
-    /// The nominal arm with all joints at zero.
-    pub(crate) fn zero_pose(&self) -> NominalPose {
-        self.nominal_pose(&self.nominal(), &vec![0.0; self.joint_count()])
-    }
-
     /// Where the masses of all links come from; none where some weigh as in the file and others as much as they are long.
     pub fn masses(&self) -> Option<Masses> {
-        let declared = self.zero_pose().declared;
+        let declared = self.nominal_arm().zero_pose().declared;
         match (declared.contains(&true), declared.contains(&false)) {
             (true, true) => None,
             (true, false) => Some(Masses::Urdf),
             (false, _) => Some(Masses::Uniform),
         }
-    }
-
-    /// The same model with these effects; `parameters` are all of its parameters.
-    pub(crate) fn with_placed(
-        &self,
-        placed: Vec<PlacedEffect>,
-        session: Session,
-        parameters: Vec<Parameter>,
-    ) -> Result<Model, ModelError> {
-        check_names(&parameters)?;
-        let effects = Some(Effects::new(placed, session.into(), self, parameters.len()));
-        let mut model = Model { parameters, effects, ..self.clone() };
-        model.refresh();
-        Ok(model)
     }
 
     /// Indices of the parameters that an exact name or a glob means (`joint*.alpha`); never none.
@@ -426,6 +378,21 @@ fn set_start_pose(frame: &mut Segment, parameters: &mut [Parameter], pose: Pose)
     for (parameter, value) in parameters[frame.parameters.clone()].iter_mut().zip(start) {
         parameter.nominal = value;
     }
+}
+
+/// Refuses arms that nothing holds in the world; `parameters` are those of the frames too.
+fn check_bases(bases: &[Segment], parameters: &[Parameter]) -> Result<(), ModelError> {
+    let is_free = |base: &&Segment| parameters[base.parameters.clone()].iter().any(|p| p.free);
+    let name = |base: &Segment| base.frame.clone().unwrap_or_default().trim_end_matches(".base").to_owned();
+    let free: Vec<String> = bases.iter().filter(is_free).map(name).collect();
+    if bases.len() < 2 || free.len() < bases.len() {
+        return Ok(());
+    }
+    let problem = format!(
+        "the bases of {} are both free, so that nothing holds the pair in place; make one of them pose = \"given\"",
+        free.join(" and ")
+    );
+    Err(ModelError::BadArms { problem })
 }
 
 fn check_names(parameters: &[Parameter]) -> Result<(), ModelError> {

@@ -25,6 +25,15 @@ pub type Asked<'a> = dyn Fn(usize) -> bool + 'a;
 /// The segments from the world to a feature, in this order; the last one ends there.
 pub(crate) type Route = Box<[SegmentId]>;
 
+/// The name of a feature and the way to it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Feature {
+    pub name: String,
+    /// The link of a marker, as it was named; none of the tip.
+    pub link: Option<String>,
+    pub route: Route,
+}
+
 /// A feature at one parameter vector and one pose: where it is and how that changes.
 pub(crate) struct LinearisedFeature {
     /// The feature in the world.

@@ -1,9 +1,8 @@
 //! What is said of one arm by itself, in the names and numbers of all arms that it stands among.
 
 use super::context::ARM;
-use super::expression::Expression;
 use super::is_of_effect;
-use super::spec::EffectSpec;
+use super::spec::{EffectSpec, Expression};
 use crate::{Arm, ModelError};
 
 /// The variables of a formula that have the number of a joint behind them.

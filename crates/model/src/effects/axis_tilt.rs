@@ -44,7 +44,8 @@ fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
         .ok_or("its axis is not parallel to the one before it, so the chain describes every small tilt")?;
     let segment = context.zero.joints[joint].segment;
     let slot = Slot::Before(segment);
-    let described = match context.model.segment_before(segment).map(|segment| &segment.geometry) {
+    let tree = &context.nominal.tree.0;
+    let described = match tree[segment].parent.map(|before| &tree[before].geometry) {
         Some(Geometry::StandardDh { hayati } | Geometry::ModifiedDh { hayati }) => *hayati,
         Some(Geometry::Origin { .. } | Geometry::Axis(_)) | None => true,
     };

@@ -53,7 +53,7 @@ fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
         );
     }
     if let Some(Since::Recording(recording)) = context.spec.since
-        && context.model.board_is_estimated(recording)
+        && context.nominal.board_is_estimated(recording)
     {
         return Err(format!("the board's pose in recording {recording} is estimated already"));
     }

@@ -1,11 +1,7 @@
 //! Putting an effect in its place on a given arm: what its kind may ask about the arm and the session.
 
 use super::drivers::gravity_in_world;
-use super::kind::{EffectKind, Shape};
-use super::nominal_pose::NominalPose;
-use super::session::Session;
-use super::spec::EffectSpec;
-use crate::Model;
+use super::kind::{EffectContext, Shape};
 use crate::error::similar_name_hint;
 use crate::segment::Motion;
 use armcal_core::{Parameter, Role, Unit};
@@ -29,20 +25,6 @@ pub const ARM: Shape = Shape {
     values: None,
 };
 
-/// One spec about to be placed.
-pub struct EffectContext<'a> {
-    /// The model it joins.
-    pub model: &'a Model,
-    /// The observations it will explain.
-    pub session: &'a Session,
-    /// What was asked for.
-    pub spec: &'a EffectSpec,
-    /// Its entry in the catalogue.
-    pub kind: &'static EffectKind,
-    /// The nominal arm with all joints at zero.
-    pub(crate) zero: &'a NominalPose,
-}
-
 impl EffectContext<'_> {
     /// The joint the spec names.
     pub fn joint(&self) -> Result<usize, String> {
@@ -58,7 +40,7 @@ impl EffectContext<'_> {
 
     /// The arm the spec names; of one arm, that.
     pub fn arm(&self) -> Result<usize, String> {
-        let arms = self.model.chain().arms();
+        let arms = self.nominal.chain.arms();
         let given = self.spec.shape.iter().find(|(key, _)| key == ARM.name).map(|(_, value)| *value);
         if given.is_none() && arms.len() > 1 {
             let names: Vec<&str> = arms.iter().map(|arm| arm.name.as_str()).collect();
@@ -72,11 +54,9 @@ impl EffectContext<'_> {
 
     /// The marker the spec names: its name, and the index of the first of its parameters.
     pub fn marker(&self) -> Result<(&str, usize), String> {
-        let known: Vec<(&str, usize)> = self
-            .model
-            .markers()
-            .map(|(id, name, _)| (name, self.model.feature_parameters(id).start))
-            .collect();
+        let markers = self.nominal.features.iter().enumerate().filter(|(_, feature)| feature.link.is_some());
+        let first = |k: usize| self.nominal.feature_segment(k).parameters.start;
+        let known: Vec<(&str, usize)> = markers.map(|(k, marker)| (marker.name.as_str(), first(k))).collect();
         if known.is_empty() {
             return Err("it acts at a marker, and there are none: declare them under [markers]".to_owned());
         }
@@ -131,7 +111,7 @@ impl EffectContext<'_> {
 
     /// The name of a joint.
     pub fn joint_name(&self, joint: usize) -> &str {
-        &self.model.chain().joint_names()[joint]
+        &self.nominal.chain.joint_names[joint]
     }
 
     /// The largest measured effort of a joint [N m], where every observation has one.
@@ -211,13 +191,12 @@ impl EffectContext<'_> {
     /// Middle of where the tip was seen or seated, in the world [m].
     pub fn volume_centre_m(&self) -> Vector3<f64> {
         let seated = || {
-            let p = self.model.nominal();
             let points: Vec<Vector3<f64>> = self
                 .session
                 .board_centres_m
                 .iter()
                 .filter_map(|(recording, in_board)| {
-                    let board = self.model.board_in_world(&p, *recording)?;
+                    let board = self.nominal.board_in_world(*recording)?;
                     Some((board * nalgebra::Point3::from(*in_board)).coords)
                 })
                 .collect();

@@ -84,7 +84,7 @@ fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
 
 fn other_joints(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {
     let own = context.spec.target.unwrap_or_default();
-    let joints = context.model.chain().joints_beside(own);
+    let joints = context.nominal.chain.joints_beside(own);
     let near = |k: &usize| *k != own && (joints.len() <= FEW_JOINTS || k.abs_diff(own) == 1);
     joints.clone().filter(near).map(|k| (k + 1) as f64).collect()
 }

@@ -2,9 +2,9 @@
 //!
 //! Everything here is worked out at the nominal arm, so that it does not move while the fit does.
 
+use super::nominal_arm::NominalArm;
 use super::nominal_pose::NominalPose;
 use super::session::Session;
-use crate::Model;
 use armcal_core::{Load, Observation};
 use nalgebra::Vector3;
 use std::sync::OnceLock;
@@ -41,7 +41,7 @@ pub struct Drivers<'o> {
     pub session_fraction: f64,
     /// Temperature above the session's mean [K]; 0 where it is not known.
     pub warming_k: f64,
-    model: &'o Model,
+    nominal: NominalArm<'o>,
     session: &'o Session,
     posed: OnceLock<Posed>,
 }
@@ -55,19 +55,19 @@ struct Posed {
 }
 
 impl<'o> Drivers<'o> {
-    pub(crate) fn of(model: &'o Model, session: &'o Session, o: &'o Observation) -> Drivers<'o> {
+    pub(crate) fn of(nominal: NominalArm<'o>, session: &'o Session, o: &'o Observation) -> Drivers<'o> {
         let time_s = (o.time_ns - session.start_ns) as f64 * 1e-9;
         let duration_s = session.duration_s();
         let warming = o.temperature_c.zip(session.reference_temperature_c).map(|(now, mean)| now - mean);
         Drivers {
             observation: o,
-            arrival: (0..model.joint_count())
+            arrival: (0..nominal.chain.joint_names.len())
                 .map(|j| o.arrival.get(j).map_or(0.0, |arrival| arrival.sign()))
                 .collect(),
             time_s,
             session_fraction: if duration_s > 0.0 { time_s / duration_s } else { 0.0 },
             warming_k: warming.unwrap_or(0.0),
-            model,
+            nominal,
             session,
             posed: OnceLock::new(),
         }
@@ -76,7 +76,7 @@ impl<'o> Drivers<'o> {
     fn posed(&self) -> &Posed {
         self.posed.get_or_init(|| {
             let o = self.observation;
-            let arm = self.model.nominal_pose(&self.model.nominal(), &o.joint_rad);
+            let arm = self.nominal.pose(&o.joint_rad);
             let gravity = gravity_in_world(self.session, &arm);
             let torque = (0..arm.joints.len())
                 .map(|j| Torque {
@@ -106,9 +106,9 @@ impl<'o> Drivers<'o> {
 
     /// Where the board was measured in the world [m], in the recording of a seated tip.
     pub(crate) fn board_m(&self) -> Option<Vector3<f64>> {
-        let (o, nominal) = (self.observation, self.model.nominal());
+        let o = self.observation;
         let seated = o.cavity().is_some();
-        let board = seated.then(|| self.model.board_in_world(&nominal, o.dwell.recording)).flatten();
+        let board = seated.then(|| self.nominal.board_in_world(o.dwell.recording)).flatten();
         board.map(|board| board.translation.vector)
     }
 

@@ -25,13 +25,12 @@
 
 use super::formula::{Formula, Number};
 use super::measure::{Dimension, Measure, dimension, dimension_symbol};
+use super::overrides::unit_of;
 use super::prelude::*;
 use super::spec::joint_index;
-use super::table::unit_of;
 use crate::error::similar_name_hint;
 use crate::segment::Motion;
 use num_dual::Dual64;
-use serde::{Deserialize, Serialize};
 
 /// The name of all lengths of the arm together.
 const LENGTHS: &str = "lengths";
@@ -46,18 +45,6 @@ pub(super) const KIND: EffectKind = EffectKind {
     place: effect_placement,
     ..EffectKind::PLAIN
 };
-
-/// A user's formula.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Expression {
-    /// Its name in specs and parameter names.
-    pub name: String,
-    /// The formula.
-    pub formula: String,
-    /// A joint, a parameter of the path, `lengths` (the relative growth of all of them), or `world.x`, `world.y`,
-    /// `world.z`.
-    pub acts_on: String,
-}
 
 /// What a variable of a formula is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -217,20 +204,19 @@ fn acts_on(text: &str, context: &EffectContext<'_>) -> Result<Acts, String> {
         return Ok(Acts::World(axis));
     }
     if text == LENGTHS {
-        return Ok(Acts::Lengths(context.model.lengths_m()));
+        return Ok(Acts::Lengths(context.nominal.lengths_m()));
     }
-    let model = context.model;
-    let joint_names = model.chain().joint_names();
+    let joint_names = context.nominal.chain.joint_names();
     let reading = text.strip_prefix('q').filter(|number| number.parse::<usize>().is_ok());
     if reading.is_some() || joint_names.iter().any(|name| name == text) {
         return joint_index(reading.unwrap_or(text), joint_names).map(Acts::Joint);
     }
-    if let Some(index) = model.index(text).filter(|index| model.is_on_path(*index)) {
+    let on_path = || context.nominal.on_path();
+    if let Some((index, _)) = on_path().find(|(_, parameter)| parameter.name == text) {
         return Ok(Acts::Parameter(index));
     }
-    let on_path = (0..model.parameters().len()).filter(|index| model.is_on_path(*index));
-    let names: Vec<&str> = on_path.map(|index| model.parameters()[index].name.as_str()).collect();
-    let all = names.iter().copied().chain(joint_names.iter().map(String::as_str)).chain([LENGTHS]);
+    let names = on_path().map(|(_, parameter)| parameter.name.as_str());
+    let all = names.chain(joint_names.iter().map(String::as_str)).chain([LENGTHS]);
     let hint = similar_name_hint(text, all);
     Err(format!(
         "acts_on = \"{text}\" is no joint, no parameter of chain, base or tip, and none of lengths, world.x, world.y, \
@@ -242,7 +228,7 @@ impl Acts {
     fn dimension(&self, context: &EffectContext<'_>) -> Dimension {
         dimension(match self {
             Acts::Joint(joint) => context.joint_unit(*joint),
-            Acts::Parameter(index) => context.model.parameters()[*index].unit,
+            Acts::Parameter(index) => context.nominal.parameters[*index].unit,
             Acts::Lengths(_) => Unit::One,
             Acts::World(_) => Unit::Metre,
         })

@@ -1,9 +1,12 @@
-//! What the catalogue says about a kind of effect, and what placing it gives.
+//! What the catalogue says about a kind of effect, what placing it takes and what it gives.
 
-use super::context::EffectContext;
+use super::classification::{Family, Lookalikes, Offered, Target, Toggle};
+use super::nominal_arm::NominalArm;
+use super::nominal_pose::NominalPose;
 use super::physics::{AnyPhysics, Slot};
+use super::session::Session;
+use super::spec::EffectSpec;
 use armcal_core::{Observation, Parameter, Unit};
-use serde::Serialize;
 use std::sync::Arc;
 
 /// One entry of the catalogue.
@@ -80,112 +83,6 @@ impl std::fmt::Debug for EffectKind {
     }
 }
 
-/// Effects that are the same to every motion, so that only another sensor or test tells them apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lookalikes {
-    /// What depends on the direction of arrival.
-    LostMotion,
-    /// Joints and links that give way.
-    Springs,
-    /// Changes at a moment.
-    Moments,
-    /// What makes every length another.
-    Lengths,
-    /// What depends on the angle of a joint.
-    Turns,
-    /// What creeps.
-    Slow,
-}
-
-/// Families of mechanisms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Family {
-    /// Play and friction: what depends on the direction of arrival.
-    LostMotion,
-    /// What gives way under load.
-    Elasticity,
-    /// Gears, belts and encoders: what depends on the joint angle.
-    Transmission,
-    /// The shape of the arm.
-    Geometry,
-    /// Something moved or slipped once.
-    Event,
-    /// Something creeps with time or temperature.
-    Drift,
-    /// The position sensor.
-    Sensor,
-    /// The calibration board.
-    Board,
-    /// Clocks.
-    Timing,
-    /// A formula of the user, in a pipeline.
-    User,
-}
-
-/// What can be switched while the pose stays, so that the effect shows in the difference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Toggle {
-    /// The direction of arrival.
-    Direction,
-    /// The way to the pose: from which side, and how far the joints came.
-    Approach,
-    /// The load at the tip.
-    Load,
-    /// Time.
-    Time,
-    /// The recording.
-    Recording,
-    /// The temperature.
-    Temperature,
-    /// Nothing.
-    None,
-}
-
-impl Toggle {
-    /// In words: what two visits to one pose differ in.
-    pub fn word(self) -> &'static str {
-        match self {
-            Toggle::Direction => "arrival direction",
-            Toggle::Approach => "approach",
-            Toggle::Load => "load",
-            Toggle::Time => "time",
-            Toggle::Recording => "recording",
-            Toggle::Temperature => "temperature",
-            Toggle::None => "pose",
-        }
-    }
-}
-
-/// Where an effect acts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Target {
-    /// At one joint.
-    Joint,
-    /// On the whole: its spec names no joint.
-    Whole,
-    /// At one marker.
-    Marker,
-}
-
-/// How the catalogue offers an effect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Offered {
-    /// For every target.
-    Once,
-    /// For every target in every recording, and as a step at any dwell.
-    Events,
-    /// For every target in every recording.
-    Recordings,
-    /// Only with its shape scanned.
-    Scanned,
-    /// Not by itself: it belongs to the noise, or to the user.
-    Never,
-}
-
 /// The values of a shape worth trying, where it would be placed, for these observations.
 pub type Values = fn(&EffectContext<'_>, &[Observation]) -> Vec<f64>;
 
@@ -208,6 +105,20 @@ pub struct Shape {
     pub parameter: bool,
     /// The values worth trying.
     pub values: Option<Values>,
+}
+
+/// One spec about to be placed.
+pub struct EffectContext<'a> {
+    /// The arm it is to act on.
+    pub nominal: NominalArm<'a>,
+    /// The observations it will explain.
+    pub session: &'a Session,
+    /// What was asked for.
+    pub spec: &'a EffectSpec,
+    /// Its entry in the catalogue.
+    pub kind: &'static EffectKind,
+    /// The nominal arm with all joints at zero.
+    pub(crate) zero: &'a NominalPose,
 }
 
 /// An effect in its place: its amplitudes and its physics.

@@ -1,6 +1,6 @@
 //! The units of a formula: what its parts are measured in, as far as the formula tells.
 
-use super::formula::{Algebra, Function};
+use super::algebra::{Algebra, Function};
 use armcal_core::Unit;
 use std::str::FromStr;
 

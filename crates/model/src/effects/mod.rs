@@ -13,6 +13,7 @@
 //! To add one, start from `eccentricity.rs` (a joint), `tool_shift.rs` (a parameter), `frame_drift.rs` (a twist) or
 //! `sensor_scale.rs` (what is seen), and name the file below: as a module, and in the catalogue.
 
+mod algebra;
 mod among_all;
 mod arm_compliance;
 mod axis_tilt;
@@ -24,6 +25,7 @@ mod belt_compliance;
 mod belt_coupling;
 mod board_scale;
 mod board_shift;
+mod classification;
 mod clock_offset;
 mod compliance;
 mod context;
@@ -41,12 +43,13 @@ mod friction_windup;
 mod gear_ratio;
 mod gravity_backlash;
 mod hardening_compliance;
-mod in_model;
 mod kind;
 mod link_bending;
 mod marker_shift;
 mod measure;
+mod nominal_arm;
 mod nominal_pose;
+mod overrides;
 mod periodic;
 mod physics;
 mod placed;
@@ -72,20 +75,23 @@ mod zero_slip;
 #[cfg(test)]
 mod tests;
 
+pub use classification::{Family, Lookalikes, Offered, Target, Toggle};
 pub use declared::is_of_effect;
 pub use drivers::{Drivers, Torque};
-pub use expression::Expression;
-pub use in_model::least_dwells;
-pub use kind::{EffectKind, Family, Lookalikes, Offered, Shape, Target, Toggle};
+pub use kind::{EffectKind, Shape};
+pub use overrides::Override;
 pub use placed::PlacedEffect;
 pub use session::Session;
-pub use spec::{EffectSpec, Since, place_and_moment};
-pub use table::{EffectTable, JointReference, Override, effects_toml, tables_toml};
+pub use spec::{EffectSpec, Expression, Since, place_and_moment};
+pub use table::{EffectTable, JointReference, effects_toml, tables_toml};
 
 pub(crate) use declared::Declared;
+pub(crate) use nominal_arm::NominalArm;
 pub(crate) use nominal_pose::NominalPose;
-pub(crate) use placed::Effects;
+pub(crate) use placed::{Effects, place_effect};
+pub(crate) use state::SEATED;
 
+use crate::error::most_similar;
 use crate::{ModelError, registry};
 use std::sync::OnceLock;
 
@@ -152,6 +158,20 @@ pub fn catalogue() -> &'static [&'static EffectKind] {
 /// A kind by its name.
 pub fn find(kind: &str) -> Option<&'static EffectKind> {
     catalogue().iter().copied().find(|entry| entry.name == kind)
+}
+
+impl EffectSpec {
+    /// The entry of the catalogue; errors name the nearest one.
+    pub fn kind(&self) -> Result<&'static EffectKind, ModelError> {
+        find(&self.kind).ok_or_else(|| {
+            let names = || catalogue().iter().map(|entry| entry.name);
+            ModelError::UnknownEffect {
+                kind: self.kind.clone(),
+                nearest: most_similar(&self.kind, names()),
+                known: names().collect::<Vec<_>>().join(", "),
+            }
+        })
+    }
 }
 
 /// Adds kinds of effects to the catalogue, after its own: once, before a model, a spec or a pipeline is read, so that one process

@@ -1,19 +1,21 @@
 //! The effects of a model: placing them and evaluating them together.
 
-use super::context::EffectContext;
+use super::classification::{Family, Target};
+use super::declared::Declared;
 use super::drivers::Drivers;
-use super::kind::{EffectKind, Family, Placement};
+use super::kind::{EffectContext, EffectKind, Placement};
+use super::nominal_arm::NominalArm;
 use super::nominal_pose::NominalPose;
 use super::physics::{AnyPhysics, Deformation, Slot};
 use super::session::Session;
 use super::spec::EffectSpec;
 use super::state;
+use crate::ModelError;
 use crate::error::similar_name_hint;
 use crate::rigid::Rigid;
 use crate::segment::{Freedom, Geometry, Segment};
-use crate::tree::{Route, Tree, TreeAt};
+use crate::tree::{Feature, Route, Tree, TreeAt};
 use crate::twist::Twist;
-use crate::{Model, ModelError};
 use armcal_core::{DwellId, FeatureId, Parameter, Role};
 use nalgebra::{Matrix3, Vector3};
 use num_dual::Dual64;
@@ -95,7 +97,8 @@ pub(crate) struct Linearised {
 
 /// Places one effect whose parameters start at `first`; gives it and its parameters.
 pub(crate) fn place_effect(
-    model: &Model,
+    nominal: NominalArm<'_>,
+    declared: &[Declared],
     session: &Session,
     spec: &EffectSpec,
     zero: &NominalPose,
@@ -103,7 +106,7 @@ pub(crate) fn place_effect(
 ) -> Result<(PlacedEffect, Vec<Parameter>), ModelError> {
     let kind = spec.kind()?;
     let bad = |problem: String| ModelError::BadEffect { effect: spec.to_string(), problem };
-    let context = EffectContext { model, session, spec, kind, zero };
+    let context = EffectContext { nominal, session, spec, kind, zero };
     check_words(&context).map_err(bad)?;
     let Placement { amplitudes, physics, slots, distorts } = (kind.place)(&context).map_err(bad)?;
     let count = amplitudes.len();
@@ -118,7 +121,7 @@ pub(crate) fn place_effect(
     }));
     let physics = state::in_state(physics, count, &parameters);
     for parameter in &mut parameters {
-        model.declared.iter().try_for_each(|declared| declared.apply(spec, parameter)).map_err(bad)?;
+        declared.iter().try_for_each(|declared| declared.apply(spec, parameter)).map_err(bad)?;
     }
     for (quantity, change) in &spec.overrides {
         let Some(own) = parameters.iter_mut().find(|p| p.name == *quantity) else {
@@ -150,7 +153,7 @@ pub(crate) fn place_effect(
 /// Whether everything the spec says has a meaning for its kind.
 fn check_words(context: &EffectContext<'_>) -> Result<(), String> {
     let (spec, kind) = (context.spec, context.kind);
-    if kind.target != super::Target::Joint && spec.target.is_some() {
+    if kind.target != Target::Joint && spec.target.is_some() {
         return Err("it does not act at a joint; leave the joint out".to_owned());
     }
     for (name, value) in &spec.shape {
@@ -173,24 +176,29 @@ fn check_words(context: &EffectContext<'_>) -> Result<(), String> {
 
 impl Effects {
     /// Puts placed effects on the tree of a model whose parameter vector then has `count` entries.
-    pub fn new(placed: Vec<PlacedEffect>, session: Arc<Session>, model: &Model, count: usize) -> Effects {
+    pub fn new(
+        placed: Vec<PlacedEffect>,
+        session: Arc<Session>,
+        nominal: NominalArm<'_>,
+        count: usize,
+    ) -> Effects {
         let mut slots: Vec<Slot> = placed.iter().flat_map(|effect| effect.slots.iter().copied()).collect();
         slots.sort_unstable();
         slots.dedup();
-        let (tree, places) = tree_with_twists(model.tree(), &slots, count);
-        let route = |rigid: &Route| tree.route(rigid.last().map_or(0, |end| places[*end]));
-        let routes = model.routes().map(route).collect();
+        let (tree, places) = tree_with_twists(nominal.tree, &slots, count);
+        let route = |rigid: &Feature| tree.route(rigid.route.last().map_or(0, |end| places[*end]));
+        let routes = nominal.features.iter().map(route).collect();
         Effects { placed, session, tree, routes, slots }
     }
 
     /// The same effects with their parameters at other places of the vector, which has `count` in all.
-    pub fn moved(&self, place: &dyn Fn(usize) -> usize, model: &Model, count: usize) -> Effects {
+    pub fn moved(&self, place: &dyn Fn(usize) -> usize, nominal: NominalArm<'_>, count: usize) -> Effects {
         let mut placed = self.placed.clone();
         for effect in &mut placed {
             let first = place(effect.parameters.start);
             effect.parameters = first..first + effect.parameters.len();
         }
-        Effects::new(placed, self.session.clone(), model, count)
+        Effects::new(placed, self.session.clone(), nominal, count)
     }
 
     /// The tree before a pose deforms it, for [`Effects::evaluate`].

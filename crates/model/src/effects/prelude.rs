@@ -1,10 +1,10 @@
 //! What the file of every effect is written with, here and in programs that [`register`](super::register) their own.
 
-pub use super::context::{
-    ARM, EffectContext, amplitude, amplitudes_wave, amplitudes_xyz, of_event, shift_xyz, turn_xyz,
-};
+pub use super::classification::{Family, Lookalikes, Offered, Target, Toggle};
+pub use super::context::{ARM, amplitude, amplitudes_wave, amplitudes_xyz, of_event, shift_xyz, turn_xyz};
 pub use super::drivers::{Drivers, Torque};
-pub use super::kind::{EffectKind, Family, Lookalikes, Offered, Placement, Shape, Target, Toggle};
+pub use super::kind::{EffectContext, EffectKind, Placement, Shape};
+pub use super::nominal_arm::NominalArm;
 pub use super::physics::{Deformation, Physics, Slot};
 pub use crate::rigid::Scalar;
 pub use armcal_core::{Observation, Unit};

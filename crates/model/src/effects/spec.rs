@@ -4,12 +4,12 @@
 //! joint, by its number from 1 or its name, or a marker by its name; recordings and dwells count from 0, as [`DwellId`] does. `@1` is in recording 1 only;
 //! `@1.17` is from dwell 17 of recording 1 to the end of the session; `@1.17-25` in its dwells 17 to 25 only.
 
-use super::expression::Expression;
-use super::table::Override;
-use super::{EffectKind, Family, Target, catalogue, find};
+use super::classification::{Family, Target};
+use super::overrides::Override;
 use crate::ModelError;
-use crate::error::{most_similar, similar_name_hint};
+use crate::error::similar_name_hint;
 use armcal_core::DwellId;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// One effect in one place.
@@ -29,6 +29,18 @@ pub struct EffectSpec {
     pub overrides: BTreeMap<String, Override>,
     /// The formula of an `expression`.
     pub expression: Option<Expression>,
+}
+
+/// A user's formula.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Expression {
+    /// Its name in specs and parameter names.
+    pub name: String,
+    /// The formula.
+    pub formula: String,
+    /// A joint, a parameter of the path, `lengths` (the relative growth of all of them), or `world.x`, `world.y`,
+    /// `world.z`.
+    pub acts_on: String,
 }
 
 /// When an effect acts.
@@ -182,11 +194,6 @@ impl EffectSpec {
             && (self.since.is_none() || self.since == other.since)
             && self.shape.iter().all(|said| other.shape.contains(said))
     }
-
-    /// The entry of the catalogue; errors name the nearest one.
-    pub fn kind(&self) -> Result<&'static EffectKind, ModelError> {
-        known_kind(&self.kind)
-    }
 }
 
 impl std::fmt::Display for EffectSpec {
@@ -206,17 +213,6 @@ impl std::fmt::Display for EffectSpec {
         }
         self.shape.iter().try_for_each(|(name, value)| write!(f, ",{name}={value}"))
     }
-}
-
-fn known_kind(kind: &str) -> Result<&'static EffectKind, ModelError> {
-    find(kind).ok_or_else(|| {
-        let names = || catalogue().iter().map(|entry| entry.name);
-        ModelError::UnknownEffect {
-            kind: kind.to_owned(),
-            nearest: most_similar(kind, names()),
-            known: names().collect::<Vec<_>>().join(", "),
-        }
-    })
 }
 
 /// The index of a joint by number from 1 or by name; what is wrong otherwise.

@@ -8,9 +8,8 @@
 //! Nor does anything say where in its gap a joint rests that nothing presses onto a flank. Where the errors show that it
 //! rests there, how much of the gap it takes is part of the model, and of its noise.
 
-use super::context::EffectContext;
 use super::drivers::Drivers;
-use super::kind::Shape;
+use super::kind::{EffectContext, Shape};
 use super::physics::{AnyPhysics, Deformation};
 use super::spec::EffectSpec;
 use armcal_core::{Observation, Parameter, Unit};
@@ -20,7 +19,7 @@ use std::ops::{MulAssign, Range};
 use std::sync::Arc;
 
 /// How much of what gravity does acts while a cavity holds the tip.
-pub(super) const SEATED: Shape = Shape {
+pub(crate) const SEATED: Shape = Shape {
     name: "seated",
     unit: Unit::One,
     default: Some(1.0),

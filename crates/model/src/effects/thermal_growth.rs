@@ -46,7 +46,7 @@ fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
         context.lasting()?;
         amplitude("growth", Unit::One, 7e-4, 0.02, "relative growth of every length over the whole session")
     };
-    let lengths = context.model.lengths_m();
+    let lengths = context.nominal.lengths_m();
     Ok(Placement::new(vec![growth], ThermalGrowth { lengths, thermometer }))
 }
 

@@ -46,7 +46,7 @@ pub(super) struct Moved {
 fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.event()?;
     let amplitudes = shift_xyz("shift on the last link along");
-    let first = context.model.tip_segment(context.arm()?).parameters.start;
+    let first = context.nominal.feature_segment(context.arm()?).parameters.start;
     Ok(Placement::new(amplitudes, Moved { first }))
 }
 

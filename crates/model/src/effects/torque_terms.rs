@@ -1,8 +1,9 @@
 //! Gravity torque with unknown masses: one amplitude for the links, one more for the share of the outer links,
 //! one for the load.
 
-use super::context::{EffectContext, amplitude};
+use super::context::amplitude;
 use super::drivers::Torque;
+use super::kind::EffectContext;
 use crate::rigid::Scalar;
 use armcal_core::{Parameter, Unit};
 

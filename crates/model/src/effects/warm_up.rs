@@ -51,7 +51,7 @@ struct WarmUp {
 fn effect_placement(context: &EffectContext<'_>) -> Result<Placement, String> {
     context.lasting()?;
     let growth = amplitude("growth", Unit::One, 7e-4, 0.02, "relative growth of every length once warm");
-    Ok(Placement::new(vec![growth], WarmUp { lengths: context.model.lengths_m() }))
+    Ok(Placement::new(vec![growth], WarmUp { lengths: context.nominal.lengths_m() }))
 }
 
 fn time_constants(context: &EffectContext<'_>, _observations: &[Observation]) -> Vec<f64> {

@@ -3,21 +3,12 @@
 use super::Model;
 use crate::measurements::find_measurement;
 use crate::rigid::Rigid;
-use crate::tree::{Route, SegmentId};
+use crate::tree::SegmentId;
 use crate::twist::Twist;
 use armcal_core::{Against, FeatureId, Observation, Pose, Reference};
 use nalgebra::Matrix6xX;
 use std::collections::BTreeSet;
 use std::ops::Range;
-
-/// The name of a feature and the way to it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Feature {
-    pub name: String,
-    /// The link of a marker, as it was named; none of the tip.
-    pub link: Option<String>,
-    pub route: Route,
-}
 
 /// A frame of the arm, for drawing.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +69,7 @@ impl Model {
         }
         match &self.effects {
             None => self.tree.joint_twists(self.route(feature), p, &o.joint_rad).1,
-            Some(effects) => effects.joint_twists(p, feature, &effects.drivers(self, o)),
+            Some(effects) => effects.joint_twists(p, feature, &self.drivers(&effects.session, o)),
         }
     }
 
@@ -173,7 +164,7 @@ impl Model {
         let at = match &self.effects {
             None => self.tree.follow(self.route(feature), p, &o.joint_rad),
             Some(effects) => {
-                effects.evaluate(&effects.predicting(p), p, feature, &effects.drivers(self, o)).tip
+                effects.evaluate(&effects.predicting(p), p, feature, &self.drivers(&effects.session, o)).tip
             }
         };
         Pose::from(&at)
@@ -200,10 +191,5 @@ impl Model {
     /// The segments from the world to a feature.
     pub(crate) fn route(&self, feature: FeatureId) -> &[SegmentId] {
         &self.features[feature.0].route
-    }
-
-    /// The ways to all features.
-    pub(crate) fn routes(&self) -> impl Iterator<Item = &Route> {
-        self.features.iter().map(|feature| &feature.route)
     }
 }

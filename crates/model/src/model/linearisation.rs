@@ -52,7 +52,7 @@ impl<'a> Linearisation<'a> {
     pub fn residual_with_jacobian(&self, o: &Observation) -> (ModelResidual, DMatrix<f64>) {
         let drivers = match &self.arm {
             Arm::Rigid(_) => None,
-            Arm::Deformed(effects, _) => Some(effects.drivers(self.model, o)),
+            Arm::Deformed(effects, _) => Some(self.model.drivers(&effects.session, o)),
         };
         let at = |feature: FeatureId| match (&self.arm, &drivers) {
             (Arm::Deformed(effects, tree), Some(drivers)) => {

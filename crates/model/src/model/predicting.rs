@@ -37,7 +37,7 @@ impl<'a> Predicting<'a> {
     /// What one of them compares.
     pub fn sides(&self, o: &Observation) -> Sides {
         let (model, p) = (self.model, self.p);
-        let effects = model.effects.as_ref().map(|effects| (effects, effects.drivers(model, o)));
+        let effects = model.effects.as_ref().map(|effects| (effects, model.drivers(&effects.session, o)));
         let at = |feature: FeatureId| match &effects {
             Some((effects, drivers)) => {
                 let at = effects.evaluate(&self.tree, p, feature, drivers);

@@ -98,7 +98,7 @@ impl Model {
     }
 
     /// The model with what was asked for.
-    pub(crate) fn with_own_asked(self) -> Result<Model, ModelError> {
+    pub(super) fn with_own_asked(self) -> Result<Model, ModelError> {
         match self.own_asked.clone() {
             Some(asked) => self.with_own(&asked.recordings, &asked.own),
             None => Ok(self),
@@ -183,7 +183,7 @@ impl Model {
     }
 
     /// The model as the recording of an observation knows it; `None` where it is this one.
-    pub(crate) fn known_by(&self, o: &Observation) -> Option<&Model> {
+    pub(super) fn known_by(&self, o: &Observation) -> Option<&Model> {
         self.view(o.dwell.recording).map(|view| &view.model)
     }
 
@@ -276,7 +276,7 @@ impl View {
         };
         let count = own.parameters.len();
         let place = |old: usize| kept.binary_search(&old).unwrap_or(count);
-        own.effects = model.effects.as_ref().map(|effects| effects.moved(&place, &own, count));
+        own.effects = model.effects.as_ref().map(|effects| effects.moved(&place, own.nominal_arm(), count));
         View { model: own, index }
     }
 

@@ -12,7 +12,7 @@ const G: f64 = 9.80665;
 
 /// Potential energy of the nominal links and the load [J].
 fn energy_j(model: &Model, joints: &[f64], load_kg: f64) -> f64 {
-    let pose: NominalPose = model.nominal_pose(&model.nominal(), joints);
+    let pose: NominalPose = model.nominal_arm().pose(joints);
     let links: f64 = (0..joints.len()).map(|k| pose.link_mass_kg(k) * G * pose.link_centre_m(k).z).sum();
     let tip = model.base_in_world(&model.nominal()) * model.tip_in_base(&model.nominal(), joints);
     links + load_kg * G * tip.translation.z
@@ -341,7 +341,7 @@ fn an_undeclared_load_bends_the_joints_like_a_declared_one() {
     let known = ["compliance:2", "compliance:3"].map(|text| model.effect(text).expect("a spec"));
     let known = model.with_effects(&known, &Session::of(&loaded)).expect("a model");
     let (mut p, mut q) = (hidden.nominal(), known.nominal());
-    let reach_m = [1, 2].map(|k| model.zero_pose().length_m(k));
+    let reach_m = [1, 2].map(|k| model.nominal_arm().zero_pose().length_m(k));
     for (k, spring) in springs.iter().enumerate() {
         let stretched_nm = G * reach_m[k..].iter().sum::<f64>();
         p[hidden.index(&format!("undeclared_load@1.yield{}", k + 2)).expect("a parameter")] =

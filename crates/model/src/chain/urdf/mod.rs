@@ -16,13 +16,14 @@ mod write;
 pub use attributes::check_xml;
 use branches::{Branches, Kept};
 use reader::{Reader, child, parse};
-pub use write::{CalibratedOrigins, roll_pitch_yaw_of, three_numbers};
+pub(crate) use write::with_origins;
+pub use write::{roll_pitch_yaw_of, three_numbers};
 
-use crate::chain::Source;
+use super::{Chain, Source};
 use crate::rigid::Rigid;
 use crate::segment::{Body, Freedom, Geometry, Joint, Motion, Segment};
 use crate::tree::SegmentId;
-use crate::{Chain, Deviation, ModelError};
+use crate::{Deviation, ModelError};
 use armcal_core::{Parameter, ParameterKind, Pose, Unit};
 use nalgebra::Vector3;
 use roxmltree::Node;

@@ -8,10 +8,9 @@
 //! Each arm is the other's reference then, and no camera is needed (Bennett and Hollerbach 1991: autonomous calibration of
 //! single-loop closed kinematic chains; Zhuang and Roth 1996, ch. 9).
 
-use crate::chain::Source;
-use crate::masses::Masses;
+use super::{Chain, Masses, Source};
+use crate::ModelError;
 use crate::segment::{Joint, Segment};
-use crate::{Chain, Frame, ModelError};
 use armcal_core::Parameter;
 use std::ops::Range;
 
@@ -28,15 +27,6 @@ pub struct Arm {
     pub joints: Range<usize>,
     /// Its segments among those of all arms.
     pub(crate) segments: Range<usize>,
-}
-
-/// The frames of one arm of several.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ArmFrames {
-    /// world_from_base.
-    pub base: Frame,
-    /// last link_from_tip.
-    pub tip: Frame,
 }
 
 impl Chain {
@@ -124,19 +114,4 @@ fn check_names(arms: &[(String, Chain)]) -> Result<(), ModelError> {
         }
     }
     Ok(())
-}
-
-/// Refuses arms that nothing holds in the world; `parameters` are those of the frames too.
-pub(crate) fn check_bases(bases: &[Segment], parameters: &[Parameter]) -> Result<(), ModelError> {
-    let is_free = |base: &&Segment| parameters[base.parameters.clone()].iter().any(|p| p.free);
-    let name = |base: &Segment| base.frame.clone().unwrap_or_default().trim_end_matches(".base").to_owned();
-    let free: Vec<String> = bases.iter().filter(is_free).map(name).collect();
-    if bases.len() < 2 || free.len() < bases.len() {
-        return Ok(());
-    }
-    let problem = format!(
-        "the bases of {} are both free, so that nothing holds the pair in place; make one of them pose = \"given\"",
-        free.join(" and ")
-    );
-    Err(ModelError::BadArms { problem })
 }

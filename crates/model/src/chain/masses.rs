@@ -1,7 +1,8 @@
 //! What the links of an arm weigh: as in its URDF, or as much as they are long.
 
+use super::Chain;
+use crate::ModelError;
 use crate::segment::{Body, Segment};
-use crate::{Chain, ModelError};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

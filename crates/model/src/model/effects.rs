@@ -1,13 +1,13 @@
 //! Effects in a model: adding them, what could be added, and what drives them.
 
-use super::context::{ARM, EffectContext};
-use super::kind::{EffectKind, Offered, Target};
-use super::placed::{self, Effects, PlacedEffect};
-use super::spec::Since;
-use super::state::SEATED;
-use super::{Drivers, EffectSpec, NominalPose, Session, catalogue};
-use crate::{Model, ModelError};
-use armcal_core::{DwellId, Observation};
+use super::{Model, check_names};
+use crate::ModelError;
+use crate::effects::prelude::{ARM, EffectContext};
+use crate::effects::{
+    Drivers, EffectKind, EffectSpec, Effects, NominalPose, Offered, PlacedEffect, SEATED, Session, Since,
+    Target, catalogue, place_effect,
+};
+use armcal_core::{DwellId, Observation, Parameter};
 use std::collections::BTreeSet;
 
 /// Dwells before the first and after the last step that is tried: one alone is an outlier.
@@ -23,20 +23,24 @@ impl Model {
         if specs.is_empty() {
             return self.clone().with_own_asked();
         }
-        let zero = self.zero_pose();
+        let zero = self.nominal_arm().zero_pose();
         let mut parameters = self.parameters().to_vec();
         let mut placed = self.effects().to_vec();
         for spec in specs {
-            let (effect, own) = placed::place_effect(self, session, spec, &zero, parameters.len())?;
+            let (effect, own) = self.place(session, spec, &zero, parameters.len())?;
             placed.push(effect);
             parameters.extend(own);
         }
-        self.with_placed(placed, session.clone(), parameters)?.with_own_asked()
+        check_names(&parameters)?;
+        let effects = Effects::new(placed, session.clone().into(), self.nominal_arm(), parameters.len());
+        let mut model = Model { parameters, effects: Some(effects), ..self.clone() };
+        model.refresh();
+        model.with_own_asked()
     }
 
     /// The effects, in the order of their parameters.
     pub fn effects(&self) -> &[PlacedEffect] {
-        self.placed_effects().map_or(&[], |effects| &effects.placed)
+        self.effects.as_ref().map_or(&[], |effects| &effects.placed)
     }
 
     /// Reads a spec such as `backlash:1` for this arm.
@@ -47,7 +51,7 @@ impl Model {
     /// Everything of the catalogue that this arm and these observations could show: every kind at every joint
     /// and in every recording it can act in, with default shapes.
     pub fn candidates(&self, session: &Session) -> Vec<EffectSpec> {
-        let zero = self.zero_pose();
+        let zero = self.nominal_arm().zero_pose();
         let mut specs = Vec::new();
         for kind in catalogue() {
             let at_targets = self.targets(kind, EffectSpec::new(kind.name));
@@ -75,7 +79,7 @@ impl Model {
         session: &Session,
         observations: &[Observation],
     ) -> Vec<(EffectSpec, Vec<EffectSpec>)> {
-        let zero = self.zero_pose();
+        let zero = self.nominal_arm().zero_pose();
         let steps = step_dwells(observations);
         let mut families = Vec::new();
         for kind in catalogue() {
@@ -84,13 +88,13 @@ impl Model {
                 if kind.offered == Offered::Events {
                     let at = |dwell: DwellId| spec.clone().since(Since::Dwell(dwell));
                     let first = steps.first().map(|(dwell, _)| at(*dwell));
-                    let placed =
-                        first.and_then(|spec| placed::place_effect(self, session, &spec, &zero, 0).ok());
+                    let placed = first.and_then(|spec| self.place(session, &spec, &zero, 0).ok());
                     let least = placed.map_or(0, |(effect, _)| least_dwells(effect.amplitudes));
                     let telling = steps.iter().filter(|(_, side)| *side >= least);
                     members.extend(telling.map(|(dwell, _)| at(*dwell)));
                 }
-                let context = EffectContext { model: self, session, spec: &spec, kind, zero: &zero };
+                let context =
+                    EffectContext { nominal: self.nominal_arm(), session, spec: &spec, kind, zero: &zero };
                 members.extend(shape_variants(&context, observations));
                 members.retain(|spec| self.offers(spec, session, &zero));
                 if !members.is_empty() {
@@ -103,12 +107,23 @@ impl Model {
 
     /// What drives the effects in an observation.
     pub fn drivers<'o>(&'o self, session: &'o Session, o: &'o Observation) -> Drivers<'o> {
-        Drivers::of(self.known_by(o).unwrap_or(self), session, o)
+        Drivers::of(self.known_by(o).unwrap_or(self).nominal_arm(), session, o)
+    }
+
+    /// Places an effect whose parameters start at `first`; gives it and its parameters.
+    pub(super) fn place(
+        &self,
+        session: &Session,
+        spec: &EffectSpec,
+        zero: &NominalPose,
+        first: usize,
+    ) -> Result<(PlacedEffect, Vec<Parameter>), ModelError> {
+        place_effect(self.nominal_arm(), &self.declared, session, spec, zero, first)
     }
 
     /// Whether an effect could be added here, with something for a fit to find.
     fn offers(&self, spec: &EffectSpec, session: &Session, zero: &NominalPose) -> bool {
-        let placed = placed::place_effect(self, session, spec, zero, 0);
+        let placed = self.place(session, spec, zero, 0);
         placed.is_ok_and(|(effect, own)| own[..effect.amplitudes].iter().any(|p| p.free))
     }
 
@@ -142,7 +157,7 @@ impl Model {
         let Some((shape, values)) = part.and_then(|shape| Some((shape, shape.values?))) else {
             return vec![spec];
         };
-        let context = EffectContext { model: self, session, spec: &spec, kind, zero };
+        let context = EffectContext { nominal: self.nominal_arm(), session, spec: &spec, kind, zero };
         values(&context, &[]).iter().map(|value| spec.clone().with(shape.name, *value)).collect()
     }
 }
@@ -160,13 +175,6 @@ impl Session {
             2 => 1..2,
             n => 0..n,
         }
-    }
-}
-
-impl Effects {
-    /// The drivers of an observation for this model.
-    pub fn drivers<'o>(&'o self, model: &'o Model, o: &'o Observation) -> Drivers<'o> {
-        model.drivers(&self.session, o)
     }
 }
 

@@ -21,10 +21,10 @@
 //! limits_deg = [-170.0, 170.0]   # optional: what the joint can read; limits_mm where it slides
 //! ```
 
-use crate::chain::Source;
+use super::{Chain, Source};
 use crate::deviation::{check_positive, from_display, robot_parameter};
 use crate::segment::{Geometry, Joint, Motion, Segment};
-use crate::{Chain, Deviation, ModelError};
+use crate::{Deviation, ModelError};
 use armcal_core::{Parameter, ParameterKind, Unit};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
