@@ -99,7 +99,7 @@ fn unlisted_sentence(u: &UnknownReport) -> String {
     printable_name(&format!(
         "Something unlisted enters at {} and depends on {}: `armcal diagnose` shows its shape and a formula to add.",
         channel_told(&u.channel),
-        driver_told(&u.driver)
+        driver_told(u.driver)
     ))
 }
 

@@ -93,8 +93,8 @@ fn main() {
                     let d = run(problem(&poses, &[(effect.clone(), vec![])], Noise::White, &mut r, true));
                     count[d.verdict as usize] += 1;
                     let u = d.unknown.as_ref();
-                    let at = u.map(|u| (u.channel.as_str(), u.driver.as_str()));
-                    right += usize::from(at == Some((channel, driver)));
+                    let at = u.map(|u| (&u.channel, u.driver));
+                    right += usize::from(at == Some((&channel, driver)));
                     if let Some(u) = u {
                         removed += u.expression.as_ref().map_or(0.0, |e| e.share_of_shape) / seeds as f64;
                         if seed == 0 {
@@ -104,7 +104,7 @@ fn main() {
                             );
                         }
                     }
-                    if at != Some((channel, driver)) || d.verdict != Verdict::Unknown {
+                    if at != Some((&channel, driver)) || d.verdict != Verdict::Unknown {
                         said.push(format!(
                             "{:?} {:?} {at:?}",
                             d.verdict,

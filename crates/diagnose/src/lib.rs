@@ -10,7 +10,7 @@
 //!   fit did not see, `scatter` says how errors repeat, `confusion` what is the same to these data;
 //! * `judge`: each among the others: `bootstrap` is the gate, `density` and `score` what it predicts, the one number by which all
 //!   are compared, `contrasts` pairs of visits, `costs` what its freedom costs; `conditioned_problems` remember it;
-//! * `diagnosis`: the result as data;
+//! * `diagnosis`: the result as data; `enters`: where an error enters and what it depends on;
 //! * `unlisted`: where what has no name enters, on what it depends, its shape, a formula to paste (`expression`); joints that
 //!   err over their own angle, all at once (`curves`);
 //! * `search`: one effect after the other while they are promising (`forward`), no more than needed (`fewer`), names against all
@@ -25,6 +25,7 @@
 
 mod config;
 mod diagnosis;
+mod enters;
 mod error;
 mod events;
 mod judge;
@@ -49,6 +50,7 @@ pub use config::DiagnosisConfig;
 pub use diagnosis::combination::{Combination, Term};
 pub use diagnosis::ripple::Ripple;
 pub use diagnosis::*;
+pub use enters::{DependsOn, EntersAt};
 pub use error::DiagnoseError;
 pub use judge::contrasts::Contrast;
 pub use judge::refit::Refit;

@@ -11,7 +11,7 @@ use crate::judge::conditioned_problems::{ConditionedProblem, ConditionedProblems
 use crate::problem::projection::Projection;
 use crate::weigh::cells::Unlisted;
 use crate::weigh::{Outside, Weighed, weigh};
-use crate::{Correlation, DiagnosisConfig, LinearRefit, Problem, Scatter};
+use crate::{Correlation, DependsOn, DiagnosisConfig, EntersAt, LinearRefit, Problem, Scatter};
 use arm::{design, problem, rng};
 use armcal_model::{Chain, Frames, Model};
 use nalgebra::{DMatrix, DVector};
@@ -91,8 +91,8 @@ pub(crate) fn outside(p: &Problem, spec: &str, cell: bool, ln_evidence: f64) -> 
     let what = Unlisted {
         channel: cell.then_some(0),
         driver: cell.then_some(0),
-        name: spec.to_string(),
-        driver_name: String::new(),
+        enters: EntersAt::Part(spec.to_string()),
+        depends: DependsOn::Pose,
         columns: own(p, spec).columns,
         unit_si: 1.0,
     };

@@ -75,6 +75,7 @@ fn problem() -> Problem {
                 typical: PLAY_MM * 1e-3,
                 never_negative: false,
             }],
+            per_turn: None,
             toggle: Toggle::Direction,
             columns: Columns::Dense(Arc::new(play)),
         }],

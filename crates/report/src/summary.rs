@@ -91,8 +91,8 @@ fn candidate_summary(c: &CandidateReport) -> CandidateSummary<'_> {
 fn unlisted_summary(u: &UnknownReport) -> UnlistedSummary<'_> {
     let expression = u.expression.as_ref();
     UnlistedSummary {
-        channel: &u.channel,
-        driver: &u.driver,
+        channel: u.channel.to_string(),
+        driver: u.driver.to_string(),
         expression: expression.map_or("", |e| &e.formula),
         acts_on: expression.map(|e| e.acts_on.as_str()),
         table: unlisted_toml(u),

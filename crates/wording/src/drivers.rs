@@ -1,47 +1,41 @@
 //! Where an error enters and what it depends on, in words.
 
+use armcal_diagnose::{DependsOn, EntersAt};
+
 /// Where an error enters, in words.
-pub fn channel_told(channel: &str) -> String {
-    let joint = channel.strip_prefix("joint").filter(|n| n.chars().all(|c| c.is_ascii_digit()));
-    match (channel, joint) {
-        (_, Some(number)) if !number.is_empty() => format!("joint {number}"),
-        ("lengths", _) => "all lengths of the arm".to_owned(),
-        ("world", _) => "the tip, along an axis of the world".to_owned(),
-        _ => channel.to_owned(),
+pub fn channel_told(channel: &EntersAt) -> String {
+    match channel {
+        EntersAt::Joint(joint) => format!("joint {}", joint + 1),
+        EntersAt::Lengths => "all lengths of the arm".to_owned(),
+        EntersAt::World => "the tip, along an axis of the world".to_owned(),
+        other => other.to_string(),
     }
 }
 
-/// What an error depends on, in words before its spelling in formulas; other products and sums of drivers as they are spelt.
-pub fn driver_told(driver: &str) -> String {
-    let joint = |text: &str, kind: char| text.strip_prefix(kind)?.parse::<usize>().ok();
-    let product = driver.split_once('*').and_then(|(s, q)| Some((joint(s, 's')?, joint(q, 'q')?)));
-    let sum = driver.split_once('+').and_then(|(a, b)| Some((joint(a, 'q')?, joint(b, 'q')?)));
-    match (product, sum) {
-        (Some((s, q)), _) if s == q => {
-            return format!("the angle of joint {q}, with opposite signs by direction of arrival ({driver})");
+/// What an error depends on, in words before its spelling in formulas.
+pub fn driver_told(driver: DependsOn) -> String {
+    let words = match driver {
+        DependsOn::Angle(j) => format!("the angle of joint {}", j + 1),
+        DependsOn::AngleSum(j) => format!("the sum of the angles of joints {} and {}", j + 1, j + 2),
+        DependsOn::Direction(j) => format!("the direction in which joint {} arrived", j + 1),
+        DependsOn::AngleByDirection(j) => {
+            format!("the angle of joint {}, with opposite signs by direction of arrival", j + 1)
         }
-        (_, Some((a, b))) => return format!("the sum of the angles of joints {a} and {b} ({driver})"),
-        _ => {}
-    }
-    let (kind, joint) = driver.split_at(driver.find(|c: char| c.is_ascii_digit()).unwrap_or(driver.len()));
-    let words = match (kind, joint.parse::<usize>()) {
-        ("q", Ok(joint)) => format!("the angle of joint {joint}"),
-        ("tau", Ok(joint)) => format!("the gravity torque on joint {joint}"),
-        ("s", Ok(joint)) => format!("the direction in which joint {joint} arrived"),
-        ("t", _) if joint.is_empty() => "time".to_owned(),
-        _ => return driver.to_owned(),
+        DependsOn::Torque(j) => format!("the gravity torque on joint {}", j + 1),
+        DependsOn::SessionTime => "time".to_owned(),
+        _ => return driver.to_string(),
     };
     format!("{words} ({driver})")
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{channel_told, driver_told};
+    use super::*;
 
     #[test]
     fn places_where_an_error_enters_are_told_in_words() {
         let told = ["joint12", "lengths", "joint2.a", "joint2 with the direction of joint3 kept", "joint"]
-            .map(channel_told);
+            .map(|text| channel_told(&text.to_owned().into()));
         let words = [
             "joint 12",
             "all lengths of the arm",
@@ -54,8 +48,8 @@ mod tests {
 
     #[test]
     fn drivers_are_told_in_words_before_their_spelling() {
-        let told =
-            ["q2", "tau3", "s1", "t", "s1*q1", "q1+q2", "s1*q2", "temperature", "recording"].map(driver_told);
+        let told = ["q2", "tau3", "s1", "t", "s1*q1", "q1+q2", "temperature", "recording"]
+            .map(|text| driver_told(text.to_owned().try_into().expect("a driver")));
         assert_eq!(
             told,
             [
@@ -65,7 +59,6 @@ mod tests {
                 "time (t)",
                 "the angle of joint 1, with opposite signs by direction of arrival (s1*q1)",
                 "the sum of the angles of joints 1 and 2 (q1+q2)",
-                "s1*q2",
                 "temperature",
                 "recording"
             ]

@@ -1,6 +1,6 @@
 //! Each number of the verdict in one plain sentence.
 
-use armcal_diagnose::{Diagnosis, FoundEffect, Nested, Unexplained, Verdict};
+use armcal_diagnose::{DependsOn, Diagnosis, FoundEffect, Nested, Unexplained, Verdict};
 use armcal_result::summary::Explanation;
 use std::collections::BTreeMap;
 
@@ -49,12 +49,14 @@ pub fn explanations(d: &Diagnosis) -> Vec<Explanation> {
     );
     for u in &d.unlisted {
         let known = match (u.shape.first(), u.shape.last()) {
-            (Some(first), Some(last)) if u.driver.starts_with('q') => format!(
-                "; it is known for {} from {:.0} to {:.0} deg, the angles visited, and says nothing beyond",
-                u.driver,
-                first.at.to_degrees(),
-                last.at.to_degrees()
-            ),
+            (Some(first), Some(last)) if matches!(u.driver, DependsOn::Angle(_) | DependsOn::AngleSum(_)) => {
+                format!(
+                    "; it is known for {} from {:.0} to {:.0} deg, the angles visited, and says nothing beyond",
+                    u.driver,
+                    first.at.to_degrees(),
+                    last.at.to_degrees()
+                )
+            }
             _ => String::new(),
         };
         say(

@@ -5,7 +5,7 @@ use crate::explanations::nested_sentence;
 use crate::sizes::{half_interval_ratio, size_in_table, sizes_of};
 use armcal_calibrate::HeldOut;
 use armcal_core::printable_name;
-use armcal_diagnose::{Diagnosis, FoundEffect, UnknownReport, Verdict};
+use armcal_diagnose::{DependsOn, Diagnosis, FoundEffect, UnknownReport, Verdict};
 use armcal_model::{EffectKind, effects_toml, find};
 use armcal_result::Called;
 
@@ -45,7 +45,7 @@ pub fn briefly_found(called: &Called, d: &Diagnosis) -> Vec<String> {
         format!(
             "unlisted, at {} over {}: {}",
             channel_told(&u.channel),
-            driver_told(&u.driver),
+            driver_told(u.driver),
             falls(&u.places)
         )
     });
@@ -102,7 +102,10 @@ pub fn unlisted_text(u: &UnknownReport) -> String {
     let range = match (u.shape.first(), u.shape.last()) {
         // An angle that counts with the direction of arrival is an angle.
         (Some(from), Some(to))
-            if u.driver.rsplit('*').next().is_some_and(|driver| driver.starts_with('q')) =>
+            if matches!(
+                u.driver,
+                DependsOn::Angle(_) | DependsOn::AngleSum(_) | DependsOn::AngleByDirection(_)
+            ) =>
         {
             let deg = |at: f64| at.to_degrees();
             format!(", known for {} from {:.0} to {:.0} deg", u.driver, deg(from.at), deg(to.at))
@@ -128,7 +131,7 @@ pub fn unlisted_text(u: &UnknownReport) -> String {
         "unlisted, at {} over {}: linearised, each place left out in turn: from {:.3} to {:.3} mm with \
          its shape{range}{ripple}{formula}",
         channel_told(&u.channel),
-        driver_told(&u.driver),
+        driver_told(u.driver),
         u.places.before,
         u.places.after
     ))

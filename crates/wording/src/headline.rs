@@ -98,12 +98,12 @@ fn as_spelt(called: &Called, d: &Diagnosis) -> String {
                 Some(joint) => format!(
                     "Something unlisted is missing: joint {} errs over its own angle ({}).",
                     joint + 1,
-                    printable_name(&u.driver)
+                    u.driver
                 ),
                 None => format!(
                     "Something unlisted is missing: it enters at {} and depends on {}.",
                     printable_name(&channel_told(&u.channel)),
-                    printable_name(&driver_told(&u.driver))
+                    driver_told(u.driver)
                 ),
             },
             None => "Something is missing, and nothing listed explains it.".to_owned(),

@@ -151,7 +151,7 @@ fn answer_of_diagnosis(diagnosis: &Diagnosis, calibrated: &Calibrated<'_>) -> Re
         probability: diagnosis.probability,
         sets: diagnosis.effects.iter().map(|e| e.set.clone()).collect(),
         set_probabilities: diagnosis.effects.iter().map(|e| e.probability).collect(),
-        unknown: diagnosis.unknown.as_ref().map(|u| (u.channel.clone(), u.driver.clone())),
+        unknown: diagnosis.unknown.as_ref().map(|u| (u.channel.to_string(), u.driver.to_string())),
         suggested: suggested.iter().map(EffectSpec::to_string).collect(),
         before_mm: held_out_mm(before),
         after_mm: held_out_mm(after.as_ref().unwrap_or(before)),

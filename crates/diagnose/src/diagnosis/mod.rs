@@ -5,6 +5,7 @@ pub(crate) mod ripple;
 
 use crate::diagnosis::combination::Combination;
 use crate::diagnosis::ripple::{Peak, Ripple};
+use crate::enters::{DependsOn, EntersAt};
 use crate::judge::contrasts::Contrast;
 use crate::weigh::scatter::Scatter;
 use armcal_calibrate::{Calibration, ErrorPlace, HeldOut};
@@ -334,10 +335,10 @@ pub struct NotTestable {
 /// Structure without a listed cause.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct UnknownReport {
-    /// Where it enters: `joint1`.
-    pub channel: String,
-    /// What it depends on: `q1`.
-    pub driver: String,
+    /// Where it enters.
+    pub channel: EntersAt,
+    /// What it depends on.
+    pub driver: DependsOn,
     /// Probability that it is this, or something like it, among nothing and the best listed explanation.
     pub probability: f64,
     /// By how much the score with it is more than with nothing [nats].

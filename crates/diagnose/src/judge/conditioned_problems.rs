@@ -304,12 +304,13 @@ pub(crate) fn as_candidate(
 ) -> Candidate {
     let sized = conditioned.weighed.sized(&cell.columns, &conditioned.problem, config);
     Candidate {
-        spec: cell.name.clone(),
+        spec: cell.name(),
         family: UNLISTED.to_string(),
         target: String::new(),
         aliases: Vec::new(),
         known: None,
         amplitudes: Vec::new(),
+        per_turn: None,
         toggle: Toggle::None,
         columns: Columns::Dense(Arc::new(sized)),
     }

@@ -7,6 +7,7 @@ pub(crate) mod places;
 pub(crate) mod projection;
 
 use crate::DiagnoseError;
+use crate::enters::EntersAt;
 pub use crate::problem::columns::Columns;
 use crate::problem::columns::Cut;
 use crate::problem::projection::{cholesky_upper, solve_cholesky};
@@ -173,6 +174,8 @@ pub struct Candidate {
     pub known: Option<String>,
     /// Amplitudes, one for each column.
     pub amplitudes: Vec<Amplitude>,
+    /// Periods in a turn of its joint, of a periodic error.
+    pub per_turn: Option<f64>,
     /// What drives it.
     pub toggle: Toggle,
     /// Columns at typical size.
@@ -212,11 +215,11 @@ impl Scan {
     }
 }
 
-/// A way an effect may enter: `joint1`, `link 2 length`, `shift`.
+/// A way an effect may enter.
 #[derive(Debug, Clone)]
 pub struct Channel {
-    /// Its name.
-    pub name: String,
+    /// Where it enters.
+    pub enters: EntersAt,
     /// Unit of its columns' amplitude.
     pub unit: Unit,
     /// Name of each axis: what an expression effect acts on.
@@ -276,7 +279,7 @@ impl Problem {
             same(&format!("the amplitudes of {}", c.spec), c.amplitudes.len(), c.columns.len())?;
         }
         for c in &self.channels {
-            same(&format!("channel {}", c.name), c.columns.nrows(), rows)?;
+            same(&format!("channel {}", c.enters), c.columns.nrows(), rows)?;
         }
         let mut at = 0;
         for d in &self.dwells {

@@ -1,6 +1,7 @@
 //! Where the unknown may enter a fitted model, as whitened columns: a joint, a length of the chain, the twist between two axes, a
 //! base that tilts, a belt, a displacement.
 
+use crate::enters::EntersAt;
 use crate::problem::Channel;
 use crate::robot::view::View;
 use armcal_calibrate::Linearisation;
@@ -25,7 +26,7 @@ impl View<'_> {
         let column =
             |of: &DMatrix<f64>, i: usize, c: usize| -of.view((0, c), (linear.rows[i].len(), 1)).column(0);
         let joint = |j: usize| Channel {
-            name: format!("joint{}", j + 1),
+            enters: EntersAt::Joint(j),
             unit: Unit::Radian,
             axes: vec![format!("q{}", j + 1)],
             columns: whiten_columns(linear, 1, |i, _| column(&turns[i], i, j)),
@@ -36,7 +37,7 @@ impl View<'_> {
             length || p.name.ends_with(".alpha")
         });
         let parameters = chain.map(|(index, p)| Channel {
-            name: p.name.clone(),
+            enters: EntersAt::Part(p.name.clone()),
             axes: vec![p.name.clone()],
             unit: p.unit,
             columns: whiten_columns(linear, 1, |i, _| column(&moves[i], i, index)),
@@ -48,13 +49,13 @@ impl View<'_> {
             lengths_m.iter().fold(none, |sum, (k, m)| sum + column(&moves[i], i, *k) * *m)
         };
         let lengths = Channel {
-            name: "lengths".to_owned(),
+            enters: EntersAt::Lengths,
             axes: vec!["lengths".to_owned()],
             unit: Unit::One,
             columns: whiten_columns(linear, 1, grown),
         };
         let world = Channel {
-            name: "world".to_owned(),
+            enters: EntersAt::World,
             axes: ["world.x", "world.y", "world.z"].map(str::to_owned).to_vec(),
             unit: Unit::Metre,
             columns: whiten_columns(linear, 3, |i, axis| {
@@ -102,7 +103,7 @@ impl View<'_> {
             };
             let of = arms.get(arm).map_or_else(String::new, |arm| format!(" of {}", arm.name));
             Channel {
-                name: format!("tilt of the base{of}"),
+                enters: EntersAt::Part(format!("tilt of the base{of}")),
                 axes: Vec::new(),
                 unit: Unit::Radian,
                 columns: whiten_columns(linear, 2, rocked),
@@ -121,7 +122,11 @@ impl View<'_> {
         let belt = |own: &Range<usize>| {
             let (upper, fore) = (own.start + 1, own.start + 2);
             Channel {
-                name: format!("joint{} with the direction of joint{} kept", upper + 1, fore + 1),
+                enters: EntersAt::Part(format!(
+                    "joint{} with the direction of joint{} kept",
+                    upper + 1,
+                    fore + 1
+                )),
                 axes: Vec::new(),
                 unit: Unit::Radian,
                 columns: Arc::new(joints[upper].columns.as_ref() - joints[fore].columns.as_ref()),

@@ -79,7 +79,7 @@ impl<'s> Point<'s> {
                         .fold([0.0, 0.0], |[r, s], (f, (with, square))| [r + f * with, s + f * f * square])
                 })
             });
-            Some(Point { frequency: frequency(candidate)?, promise: screening_score(sums), candidate })
+            Some(Point { frequency: candidate.per_turn?, promise: screening_score(sums), candidate })
         };
         scan.points.iter().zip(functions).filter_map(of).collect()
     }
@@ -89,11 +89,6 @@ impl<'s> Point<'s> {
 fn nearest<'p, 's>(points: &'p [Point<'s>], frequency: f64) -> Option<&'p Point<'s>> {
     let off = |p: &Point<'_>| (p.frequency - frequency).abs();
     points.iter().min_by(|a, b| off(a).total_cmp(&off(b))).filter(|p| off(p) <= ONE_FREQUENCY)
-}
-
-/// The frequency in the name of a point of a scan [1/turn].
-fn frequency(point: &Candidate) -> Option<f64> {
-    point.spec.split_once("frequency=")?.1.parse().ok()
 }
 
 /// All of them as one, each with amplitudes of its own.
@@ -126,7 +121,7 @@ mod tests {
         let mut p = problem(&poses, &[], Noise::White, &mut r, true);
         // A typical error at every joint, 23 times a turn, none of it large.
         for scan in p.scans.iter().filter(|s| s.points[0].family == PERIODIC) {
-            let own = scan.points.iter().find(|c| c.spec.ends_with("frequency=23"));
+            let own = scan.points.iter().find(|c| c.per_turn == Some(23.0));
             p.residual += own.expect("a point of the grid").columns.dense(&p.dwells, 1.0)
                 * DVector::from_vec(vec![0.8, -0.6]);
         }

@@ -1,6 +1,7 @@
 //! Families with a shape to be searched, seen by a fitted model's observations: each value of the shape as columns.
 
 use crate::DiagnoseError;
+use crate::enters::EntersAt;
 use crate::problem::{Candidate, Channel, Columns, Scan};
 use crate::robot::stretches::{running_sums, score_between, stretches};
 use crate::robot::view::View;
@@ -78,8 +79,8 @@ impl View<'_> {
         base: &Linearisation,
     ) -> Result<Vec<Candidate>, DiagnoseError> {
         let channel = |spec: &EffectSpec| {
-            let name = format!("joint{}", spec.target? + 1);
-            channels.iter().find(|c| c.name == name).map(|c| &c.columns)
+            let joint = EntersAt::Joint(spec.target?);
+            channels.iter().find(|c| c.enters == joint).map(|c| &c.columns)
         };
         let mut products = self.products.borrow_mut();
         let refined = |spec: &EffectSpec| self.sizes.get(&spec.to_string()).is_some_and(Option::is_some);
@@ -158,16 +159,22 @@ impl View<'_> {
         let at = |member: &EffectSpec| Candidate {
             spec: member.to_string(),
             known: self.knowledge.acts(member).map(str::to_owned),
+            per_turn: per_turn(member),
             columns: Columns::Wave {
                 base: channel.columns.clone(),
                 angle_rad: angle_rad.clone(),
-                per_turn: member.shape.iter().find(|(name, _)| name == "frequency").map_or(0.0, |s| s.1),
+                per_turn: per_turn(member).unwrap_or(0.0),
                 sizes: [sine.typical, cosine.typical],
             },
             ..like.clone()
         };
         Some(members.iter().map(at).collect())
     }
+}
+
+/// Periods in a turn of a joint, of a periodic error.
+pub(crate) fn per_turn(spec: &EffectSpec) -> Option<f64> {
+    spec.shape.iter().find(|(name, _)| name == "frequency").map(|(_, frequency)| *frequency)
 }
 
 /// Rows of each dwell.
@@ -196,8 +203,8 @@ impl<'c> Scanned<'c> {
         if let Some(first) = times.order.first().filter(|_| steps) {
             return Scanned::Steps(family.clone().since(Since::Dwell(*first)).into());
         }
-        let joint = family.target.map(|j| format!("joint{}", j + 1));
-        let channel = channels.iter().find(|c| Some(&c.name) == joint.as_ref());
+        let joint = family.target.map(EntersAt::Joint);
+        let channel = channels.iter().find(|c| Some(&c.enters) == joint.as_ref());
         channel.filter(|_| family.kind == "periodic").map_or(Scanned::Alone, Scanned::Waves)
     }
 

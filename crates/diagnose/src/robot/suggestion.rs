@@ -1,12 +1,11 @@
 //! From a diagnosis to the effects that it proposes to add.
 
 use crate::diagnosis::{Diagnosis, ExpressionParameter, FoundEffect, UnknownReport, Verdict};
+use crate::enters::DependsOn;
 use armcal_model::{EffectSpec, Expression, ModelError, Override};
 
 /// A formula must remove this share of what the free shape removes; otherwise a whole curve is offered.
 const FORMULA_SHARE: f64 = 0.9;
-/// The drivers of what depends on the time since the start of the session, or on which of its recordings it is.
-const OF_THE_SESSION: [&str; 2] = ["t", "recording"];
 
 impl Diagnosis {
     /// The effects found, the most probable name of each; where none has a name, all unlisted shapes, and beside error
@@ -46,7 +45,7 @@ impl Diagnosis {
         joint_names: &[String],
         recordings: usize,
     ) -> Result<(Vec<EffectSpec>, Vec<EffectSpec>), ModelError> {
-        let of_it = |u: &&UnknownReport| OF_THE_SESSION.contains(&u.driver.as_str());
+        let of_it = |u: &&UnknownReport| matches!(u.driver, DependsOn::SessionTime | DependsOn::Recording);
         let of_time: Vec<EffectSpec> =
             self.unlisted.iter().filter(of_it).filter_map(UnknownReport::effect).collect();
         let all = self.suggested(joint_names)?;
@@ -57,8 +56,7 @@ impl Diagnosis {
 impl UnknownReport {
     /// Index of the joint whose error follows its own angle; none of anything else.
     pub fn own_angle(&self) -> Option<usize> {
-        let joint = self.channel.strip_prefix("joint").filter(|joint| self.driver == format!("q{joint}"))?;
-        joint.parse::<usize>().ok()?.checked_sub(1)
+        self.channel.own_angle(self.driver)
     }
 
     /// What to add for it: the expression that was fitted, or the error curve of a joint over its own angle where no
@@ -75,7 +73,7 @@ impl UnknownReport {
         let formula = formula?;
         let mut spec = EffectSpec::new("expression");
         spec.expression = Some(Expression {
-            name: format!("{}_over_{}", as_identifier(&self.channel), as_identifier(&self.driver)),
+            name: as_identifier(&format!("{}_over_{}", self.channel, self.driver)),
             formula: formula.formula.clone(),
             acts_on: formula.acts_on.clone(),
         });

@@ -8,6 +8,7 @@ use crate::DiagnoseError;
 use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Part, Problem};
 use crate::robot::group::{one_frequency, with_groups};
 use crate::robot::knowledge::Knowledge;
+use crate::robot::scans::per_turn;
 use armcal_calibrate::{FitConfig, LinearAxis, LinearPose, Linearisation, linearise, linearise_more};
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};
@@ -151,6 +152,7 @@ impl View<'_> {
             aliases: effect.kind.aliases.iter().map(|alias| (*alias).to_owned()).collect(),
             known: self.knowledge.acts(&effect.spec).map(str::to_owned),
             amplitudes: own.iter().map(amplitude).collect(),
+            per_turn: per_turn(&effect.spec),
             toggle: toggle(effect),
             columns: Columns::Dense(Arc::new(-jacobian.select_columns(&own))),
         }

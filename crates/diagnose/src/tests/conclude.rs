@@ -6,6 +6,7 @@ use super::*;
 use crate::LinearRefit;
 use crate::diagnose_problem;
 use crate::diagnosis::{UnknownReport, Verdict::*};
+use crate::enters::{DependsOn, EntersAt};
 use crate::tests::{planar_arm, planted, quick, scatter};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{Arrival, Code, DwellId, ErrorStats, Reference, Unit};
@@ -82,8 +83,8 @@ fn found(verdict: Verdict) -> Diagnosis {
 fn shape() -> UnknownReport {
     let places = found(Identified).effects.swap_remove(0).places;
     UnknownReport {
-        channel: "joint1".to_owned(),
-        driver: "q1".to_owned(),
+        channel: EntersAt::Joint(0),
+        driver: DependsOn::Angle(0),
         probability: 0.9,
         gain_nats: 20.0,
         unit: Unit::Radian,
@@ -406,7 +407,7 @@ fn what_shows_beside_error_curves_is_added_with_them() {
     assert_eq!(suggested(&d), ["error_curve:1,harmonics=30,typical=0.00021", "backlash:1"]);
     assert_eq!(d.beside_curves().len(), 1);
     // Beside anything else a name is only a hint.
-    d.unlisted[0].channel = "joint2".to_owned();
+    d.unlisted[0].channel = EntersAt::Joint(1);
     assert!(suggested(&d).is_empty() && d.beside_curves().is_empty());
     d.verdict = Unexplained;
     d.unlisted.clear();

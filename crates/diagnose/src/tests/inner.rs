@@ -260,7 +260,7 @@ fn curves_come_first_and_else_the_best_unlisted() {
     let d = assembled(&p, &s);
     assert_eq!((d.verdict, d.unlisted.len()), (Verdict::Unknown, 1));
     let u = d.unknown.as_ref().unwrap();
-    assert_eq!((u.channel.as_str(), u.driver.as_str()), (channel, driver));
+    assert_eq!((&u.channel, u.driver), (&channel, driver));
     assert_eq!(d.probability, Some(p_unlisted(&p)));
     assert!(d.probability > Some(0.9), "{:?}", d.probability);
 }

@@ -3,7 +3,7 @@
 use super::quick;
 use crate::robot::knowledge::Knowledge;
 use crate::robot::view::View;
-use crate::{Calibrated, Candidate, Diagnosis, Problem, Verdict, diagnose};
+use crate::{Calibrated, Candidate, Diagnosis, EntersAt, Problem, Verdict, diagnose};
 use armcal_calibrate::{FitConfig, HoldoutConfig, calibrate};
 use armcal_core::{DwellId, FeatureId, Observation, Pose, Reference};
 use armcal_model::{Chain, Frame, Frames, Marker, Model, Session};
@@ -180,7 +180,7 @@ fn a_joint_that_is_off_moves_all_rows_of_its_pose() {
     let rig = rig(3, 12, None);
     let (step, p) = (1e-6, rig.model.nominal());
     let problem = rig.problem();
-    let channel = problem.channels.iter().find(|c| c.name == "joint2").unwrap();
+    let channel = problem.channels.iter().find(|c| c.enters == EntersAt::Joint(1)).unwrap();
     for (d, own) in problem.dwells.iter().zip(rig.observations.chunks(3)) {
         let stacked = |by: f64| {
             let rows = own.iter().flat_map(|o| {

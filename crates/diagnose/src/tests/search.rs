@@ -197,9 +197,9 @@ fn a_curve_that_joined_leaves_little_of_its_own_evidence_whatever_the_noise() {
         with_conditioned(&p, &config, |conditioned_problems| {
             let bare = conditioned_problems.with(&[]).unwrap();
             let cell = bare.weighed.best_cell().unwrap();
-            assert_eq!(cell.what.name, "joint3 <- q3");
+            assert_eq!(cell.what.name(), "joint3 <- q3");
             let with = conditioned_problems.with(&[as_candidate(&cell.what, &bare, &config)]).unwrap();
-            let own = with.weighed.unlisted.iter().filter(|u| u.what.name == cell.what.name);
+            let own = with.weighed.unlisted.iter().filter(|u| u.what.name() == cell.what.name());
             let left = own.map(|u| u.ln_evidence).fold(0.0, f64::max);
             assert!(left < 0.2 * cell.ln_evidence, "{declared}: {left} of {}", cell.ln_evidence);
         });

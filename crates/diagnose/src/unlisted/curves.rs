@@ -11,7 +11,6 @@ use crate::judge::conditioned_problems::{ConditionedProblem, ConditionedProblems
 use crate::problem::Candidate;
 use crate::unlisted::describe_unlisted;
 use crate::weigh::Outside;
-use crate::weigh::cells::Unlisted;
 
 /// A joint's own error curve.
 #[derive(Debug)]
@@ -44,7 +43,7 @@ pub(crate) fn error_curves(
         let others = shapes.iter().enumerate().filter(|(l, _)| *l != k).map(|(_, s)| s);
         let base: Vec<Candidate> = names.iter().chain(others).cloned().collect();
         let conditioned = conditioned_problems.with(&base)?;
-        let own = conditioned.weighed.unlisted.iter().filter(|u| u.what.name == shape.spec);
+        let own = conditioned.weighed.unlisted.iter().filter(|u| u.what.name() == shape.spec);
         let best = own.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence));
         if let Some(report) = best.and_then(|u| describe_unlisted(&conditioned, u, config)) {
             curves.push(Curve { candidate: shape.clone(), report });
@@ -78,15 +77,10 @@ fn leading_curve<'r>(
     };
     let own = weighed.unlisted.iter().filter(|u| {
         u.ln_evidence >= limit.max(config.margin_nats)
-            && own_angle(&u.what)
-            && taken.iter().all(|t| t.spec != u.what.name)
+            && u.what.enters.own_angle(u.what.depends).is_some()
+            && taken.iter().all(|t| t.spec != u.what.name())
     });
     let mut own: Vec<&Outside> = own.collect();
     own.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
     own.into_iter().find(|u| conditioned.predicts(u, config))
-}
-
-/// Whether a joint errs over its own angle.
-fn own_angle(cell: &Unlisted) -> bool {
-    cell.name.strip_prefix("joint").and_then(|rest| rest.split_once(" <- q")).is_some_and(|(a, b)| a == b)
 }

@@ -2,9 +2,10 @@
 
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::{Expression, ExpressionParameter};
+use crate::enters::DependsOn;
 use crate::problem::{Channel, Columns, Problem};
 use crate::weigh::Weighed;
-use crate::weigh::drivers::{Driver, DriverKind, mean_and_sd, range};
+use crate::weigh::drivers::{Driver, mean_and_sd, range};
 use crate::weigh::evidence::{best_amplitude, of_all, posterior_coefficients};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -84,26 +85,24 @@ pub(crate) fn fit_expression(
 }
 
 fn families(problem: &Problem, driver: &Driver) -> Vec<Family> {
-    match driver.kind {
-        DriverKind::Smooth | DriverKind::Own(_) => smooth_families(&driver.name, driver, false),
-        DriverKind::Time => smooth_families(&driver.name, driver, true),
-        DriverKind::Direction(_) => with_pose(problem, &driver.name, &driver.value),
-        DriverKind::DirectionAlong(joint) => direction_families(problem, driver, joint),
-        DriverKind::Load => {
+    match driver.what {
+        DependsOn::Direction(_) => with_pose(problem, &driver.what.to_string(), &driver.value),
+        DependsOn::AngleByDirection(joint) => direction_families(problem, driver, joint),
+        DependsOn::Load => {
             let (mean, _) = mean_and_sd(&driver.value);
             let value: Vec<f64> = driver.value.iter().map(|v| v - mean).collect();
             with_pose(problem, &standardised_term("load", mean, 1.0), &value)
         }
-        DriverKind::Recording => Vec::new(),
+        DependsOn::Recording => Vec::new(),
+        what => smooth_families(what, &driver.value),
     }
 }
 
 /// Polynomials, harmonics, a smooth step, a bump, a warm-up.
-fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
-    let value = &driver.value;
+fn smooth_families(what: DependsOn, value: &[f64]) -> Vec<Family> {
     let (low, high) = range(value);
     let (centre, half) = (0.5 * (low + high), 0.5 * (high - low));
-    let x = if name.contains('+') { format!("({name})") } else { name.to_owned() };
+    let x = if matches!(what, DependsOn::AngleSum(_)) { format!("({what})") } else { what.to_string() };
     // Every parameter then has the channel's unit: the numbers carry the driver's.
     let shifted = standardised_term(&x, centre, half);
     let mut all = Vec::new();
@@ -130,7 +129,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
         all.push(Family { terms, basis, ln_tried: tried.ln() });
     };
     // An angle has a sine of itself; of seconds and kelvins only a multiple has one.
-    if name.starts_with('q') {
+    if matches!(what, DependsOn::Angle(_) | DependsOn::AngleSum(_)) {
         for order in 1..=3usize {
             harmonic(&(1..=order).map(|k| k as f64).collect::<Vec<_>>(), 1.0);
         }
@@ -162,7 +161,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
             shaped(format!("exp(-({u}^2))"), &|v| (-((v - c) / w).powi(2)).exp(), 120.0);
         }
     }
-    if time {
+    if what == DependsOn::SessionTime {
         for part in [0.05, 0.1, 0.2, 0.4, 0.8] {
             let constant = 2.0 * half * part;
             let inner = format!("(1 - exp(-{x}/{}))", format_number(constant));
@@ -174,7 +173,7 @@ fn smooth_families(name: &str, driver: &Driver, time: bool) -> Vec<Family> {
 
 /// A direction alone, and alone plus each smooth family of the angle times it.
 fn direction_families(problem: &Problem, driver: &Driver, joint: usize) -> Vec<Family> {
-    let sign = format!("s{}", joint + 1);
+    let sign = DependsOn::Direction(joint);
     let arrival = |i: usize| problem.dwells[i].arrival[joint];
     let with_sign = |family: Family| {
         let mut terms = vec![("c0".to_string(), format!("c0*{sign}"))];
@@ -185,8 +184,7 @@ fn direction_families(problem: &Problem, driver: &Driver, joint: usize) -> Vec<F
         });
         Family { terms, basis, ln_tried: family.ln_tried }
     };
-    let angle = format!("q{}", joint + 1);
-    smooth_families(&angle, driver, false).into_iter().map(with_sign).collect()
+    smooth_families(DependsOn::Angle(joint), &driver.value).into_iter().map(with_sign).collect()
 }
 
 /// A switched value alone, and with a part linear in each joint that moves.
@@ -203,7 +201,7 @@ fn with_pose(problem: &Problem, name: &str, value: &[f64]) -> Vec<Family> {
         let q: Vec<f64> = problem.dwells.iter().map(|d| d.joint_rad[j]).collect();
         let (mean, sd) = mean_and_sd(&q);
         if sd > 1e-6 {
-            let inner = standardised_term(&format!("q{}", j + 1), mean, sd);
+            let inner = standardised_term(&DependsOn::Angle(j).to_string(), mean, sd);
             terms.push((format!("c{}", j + 1), format!("c{}*{name}*{inner}", j + 1)));
             joints.push((j, mean, sd));
         }

@@ -6,13 +6,14 @@ pub(crate) mod expression;
 use crate::config::DiagnosisConfig;
 use crate::diagnosis::ripple::{Peak, beside_slow, peak};
 use crate::diagnosis::{Series, ShapePoint, UnknownReport};
+use crate::enters::DependsOn;
 use crate::judge::conditioned_problems::ConditionedProblem;
 use crate::judge::score::bootstrap_weights;
 use crate::problem::{Channel, Problem};
 use crate::unlisted::expression::{fit_expression, to_digits};
 use crate::weigh::Outside;
 use crate::weigh::cells::Unlisted;
-use crate::weigh::drivers::{Driver, DriverKind, range};
+use crate::weigh::drivers::{Driver, range};
 use crate::weigh::evidence::{best_amplitude, posterior_coefficients};
 use armcal_core::Unit;
 use nalgebra::{DMatrix, DVector};
@@ -62,7 +63,7 @@ pub(crate) fn describe_unlisted(
     if let (Some(channel), Some(driver)) = (channel, driver) {
         let axis = strongest_axis(&gram.a, &theta, channel.columns.ncols());
         shape = shape_points(problem, best, driver, axis, &theta, &(covariance * variance));
-        if channel.name.strip_prefix("joint") == Some(driver.name.trim_start_matches('q')) {
+        if best.enters.own_angle(best.depends).is_some() {
             let per = driver.basis.ncols();
             let curve = best.unit_si * (driver.basis.as_ref() * theta.rows(axis * per, per));
             strongest = peak(&driver.value, curve.as_slice(), per);
@@ -73,7 +74,7 @@ pub(crate) fn describe_unlisted(
     // A formula acts on one thing: where the best cell has no such thing, the best one that has.
     let formulable = |u: &&Outside| {
         u.what.channel.and_then(|c| problem.channels.get(c)).is_some_and(|c| !c.axes.is_empty())
-            && !u.what.driver_name.starts_with("recording")
+            && u.what.depends != DependsOn::Recording
     };
     let best_formulable = || {
         let all = weighed.unlisted.iter().filter(formulable);
@@ -93,12 +94,12 @@ pub(crate) fn describe_unlisted(
     let mut rivals: Vec<&Outside> = weighed
         .unlisted
         .iter()
-        .filter(|u| u.what.name != best.name && u.ln_evidence > ln - config.margin_nats)
+        .filter(|u| u.ln_evidence > ln - config.margin_nats && u.what.name() != best.name())
         .collect();
     rivals.sort_by(|a, b| b.ln_evidence.total_cmp(&a.ln_evidence));
     Some(UnknownReport {
-        channel: channel.map_or("displacement", |c| c.name.as_str()).to_string(),
-        driver: best.driver_name.clone(),
+        channel: best.enters.clone(),
+        driver: best.depends,
         probability: bootstrap_weights(&all, config)[0],
         gain_nats: score.above(conditioned.nothing()).nats,
         unit: channel.map_or(Unit::Metre, |c: &Channel| c.unit),
@@ -108,7 +109,7 @@ pub(crate) fn describe_unlisted(
         series,
         expression: formula,
         places,
-        rivals: rivals.into_iter().map(|u| u.what.name.clone()).collect(),
+        rivals: rivals.into_iter().map(|u| u.what.name()).collect(),
     })
 }
 
@@ -151,13 +152,13 @@ fn shape_points(
         sigma: best.unit_si * (basis.transpose() * spread * &basis)[(0, 0)].max(0.0).sqrt(),
     };
     let (low, high) = range(&driver.value);
-    match (&driver.kernel, driver.kind) {
+    match (&driver.kernel, driver.what) {
         (Some(kernel), _) => {
             let points = FEWEST_POINTS.max(POINTS_A_FUNCTION * per + 1);
             let x = |k: usize| low + (high - low) * k as f64 / (points - 1) as f64;
             (0..points).map(|k| at(x(k), kernel.at(x(k)))).collect()
         }
-        (None, DriverKind::Recording) => {
+        (None, DependsOn::Recording) => {
             let mut first: Vec<(usize, usize)> = Vec::new();
             for (i, d) in problem.dwells.iter().enumerate() {
                 if first.iter().all(|f| f.0 != d.id.recording) {

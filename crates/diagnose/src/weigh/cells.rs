@@ -7,10 +7,9 @@
 //! geometry (Brynjarsdottir and O'Hagan 2014 on why it must be).
 
 use crate::config::DiagnosisConfig;
+use crate::enters::{DependsOn, EntersAt};
 use crate::problem::{Columns, Problem};
-use crate::weigh::drivers::{
-    Driver, DriverKind, drivers, is_varying, mean_and_sd, range, standardised_joints,
-};
+use crate::weigh::drivers::{Driver, drivers, is_varying, mean_and_sd, range, standardised_joints};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -26,14 +25,21 @@ pub(crate) struct Unlisted {
     pub channel: Option<usize>,
     /// Index of the driver; none for a discrepancy.
     pub driver: Option<usize>,
-    /// Name: `joint1 <- q1`, `displacement <- pose`.
-    pub name: String,
+    /// Where it enters.
+    pub enters: EntersAt,
     /// What it depends on.
-    pub driver_name: String,
+    pub depends: DependsOn,
     /// Columns.
     pub columns: Columns,
     /// SI amplitude (of the channel's unit) of one unit of the columns.
     pub unit_si: f64,
+}
+
+impl Unlisted {
+    /// Name: `joint1 <- q1`, `displacement <- pose`.
+    pub fn name(&self) -> String {
+        format!("{} <- {}", self.enters, self.depends)
+    }
 }
 
 /// Every channel with every driver.
@@ -42,9 +48,7 @@ pub(crate) fn cells(problem: &Problem, drivers: &[Driver], config: &DiagnosisCon
     for (c, channel) in problem.channels.iter().enumerate() {
         let power: Vec<f64> = problem.dwells.iter().map(|d| d.moved_m2(&channel.columns)).collect();
         for (k, driver) in drivers.iter().enumerate() {
-            if let DriverKind::Own(j) | DriverKind::DirectionAlong(j) = driver.kind
-                && channel.name != format!("joint{}", j + 1)
-            {
+            if driver.only_at.is_some_and(|j| channel.enters != EntersAt::Joint(j)) {
                 continue;
             }
             let mean: f64 =
@@ -57,8 +61,8 @@ pub(crate) fn cells(problem: &Problem, drivers: &[Driver], config: &DiagnosisCon
             all.push(Unlisted {
                 channel: Some(c),
                 driver: Some(k),
-                name: format!("{} <- {}", channel.name, driver.name),
-                driver_name: driver.name.clone(),
+                enters: channel.enters.clone(),
+                depends: driver.what,
                 columns: Columns::Product {
                     base: channel.columns.clone(),
                     basis: driver.basis.clone(),
@@ -77,7 +81,7 @@ pub(crate) struct Dependences {
     /// Drivers of the cells.
     pub drivers: Vec<Driver>,
     /// Of each kind of smooth discrepancy its functions at the dwells.
-    smooth: Vec<(&'static str, Arc<DMatrix<f64>>)>,
+    smooth: Vec<(DependsOn, Arc<DMatrix<f64>>)>,
 }
 
 impl Dependences {
@@ -95,11 +99,11 @@ pub(crate) fn discrepancies(
 ) -> Vec<Unlisted> {
     let base = world_axes(problem);
     let size = config.unlisted_effect_mm * 1e-3 / 3f64.sqrt();
-    let of = |(name, functions): &(&str, Arc<DMatrix<f64>>)| Unlisted {
+    let of = |(depends, functions): &(DependsOn, Arc<DMatrix<f64>>)| Unlisted {
         channel: None,
         driver: None,
-        name: format!("displacement <- {name}"),
-        driver_name: (*name).to_owned(),
+        enters: EntersAt::Displacement,
+        depends: *depends,
         columns: Columns::Product { base: base.clone(), basis: functions.clone(), size },
         unit_si: size,
     };
@@ -107,7 +111,7 @@ pub(crate) fn discrepancies(
 }
 
 /// The functions of each kind at the dwells.
-fn discrepancy_functions(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f64>>)> {
+fn discrepancy_functions(problem: &Problem) -> Vec<(DependsOn, Arc<DMatrix<f64>>)> {
     let n = problem.dwells.len();
     let pose = pose_kernel(problem);
     let time: Vec<f64> = problem.dwells.iter().map(|d| d.time_s).collect();
@@ -115,36 +119,38 @@ fn discrepancy_functions(problem: &Problem) -> Vec<(&'static str, Arc<DMatrix<f6
     let (start, end) = range(&time);
     let span = end - start;
     let mut all = Vec::new();
-    let mut add = |name: &'static str, kernel: &dyn Fn(usize, usize) -> f64| {
+    let mut add = |depends: DependsOn, kernel: &dyn Fn(usize, usize) -> f64| {
         let functions = low_rank(n, kernel);
         if functions.ncols() > 0 {
-            all.push((name, Arc::new(functions)));
+            all.push((depends, Arc::new(functions)));
         }
     };
-    add("pose", &|i, j| pose(i, j));
+    add(DependsOn::Pose, &|i, j| pose(i, j));
     let moving: Vec<usize> = (0..problem.joints())
         .filter(|j| is_varying(&problem.dwells.iter().map(|d| d.arrival[*j]).collect::<Vec<_>>()))
         .collect();
     if !moving.is_empty() {
-        add("arrival directions", &|i, j| {
+        add(DependsOn::Directions, &|i, j| {
             let (a, b) = (&problem.dwells[i].arrival, &problem.dwells[j].arrival);
             let same: f64 = moving.iter().map(|k| a[*k] * b[*k]).sum();
             same / moving.len() as f64 * (0.4 + 0.6 * pose(i, j))
         });
     }
     if span > 0.0 {
-        add("time", &|i, j| (-0.5 * ((time[i] - time[j]) / (0.08 * span)).powi(2)).exp());
+        add(DependsOn::Time, &|i, j| (-0.5 * ((time[i] - time[j]) / (0.08 * span)).powi(2)).exp());
     }
     let first = problem.dwells[0].id.recording;
     if problem.dwells.iter().any(|d| d.id.recording != first) {
-        add("recording", &|i, j| {
+        add(DependsOn::Recording, &|i, j| {
             let same = problem.dwells[i].id.recording == problem.dwells[j].id.recording;
             if same { 0.3 + 0.7 * pose(i, j) } else { 0.0 }
         });
     }
     if is_varying(&load) {
         let (mean, sd) = mean_and_sd(&load);
-        add("load", &|i, j| (load[i] - mean) * (load[j] - mean) / (sd * sd) * (0.4 + 0.6 * pose(i, j)));
+        add(DependsOn::Load, &|i, j| {
+            (load[i] - mean) * (load[j] - mean) / (sd * sd) * (0.4 + 0.6 * pose(i, j))
+        });
     }
     all
 }

@@ -1,5 +1,6 @@
 //! What an effect may depend on, as numbers at the dwells, and smooth functions of it.
 
+use crate::enters::DependsOn;
 use crate::problem::Problem;
 use armcal_calibrate::gram;
 use nalgebra::{DMatrix, DVector};
@@ -25,33 +26,14 @@ const ALONG_FUNCTIONS: usize = 16;
 const TIME_LENGTHS: [f64; 2] = [0.05, 0.3];
 const TIME_FUNCTIONS: usize = 20;
 
-/// What varies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum DriverKind {
-    /// A joint reading or a sum of them.
-    Smooth,
-    /// Time.
-    Time,
-    /// The arrival direction of a joint, alone and times the pose.
-    Direction(usize),
-    /// A joint's own angle in detail; enters at that joint only.
-    Own(usize),
-    /// The arrival direction of a joint times functions of its angle: lost motion that is not the same everywhere.
-    /// Enters at that joint only.
-    DirectionAlong(usize),
-    /// The recording.
-    Recording,
-    /// Load, alone and times the pose.
-    Load,
-}
-
 /// One driver with the functions of it that a cell uses.
 #[derive(Debug, Clone)]
 pub(crate) struct Driver {
-    /// Name, as a formula writes it: `q1`, `q2+q3`, `s2`, `t`, `recording`, `load`, `tau2`, `temperature`.
-    pub name: String,
-    /// What it is.
-    pub kind: DriverKind,
+    /// What varies.
+    pub what: DependsOn,
+    /// The joint at which alone it enters: of its own angle in detail, and of its direction times functions of its angle, which
+    /// is lost motion that is not the same everywhere.
+    pub only_at: Option<usize>,
     /// Its value at each dwell; of a direction along an angle, the angle.
     pub value: Vec<f64>,
     /// Functions of it at the dwells: dwells x m.
@@ -62,8 +44,8 @@ pub(crate) struct Driver {
 
 impl Driver {
     /// One that takes a few values, with functions at the dwells alone.
-    fn switched(name: &str, kind: DriverKind, value: Vec<f64>, basis: DMatrix<f64>) -> Driver {
-        Driver { name: name.to_owned(), kind, value, basis: Arc::new(basis), kernel: None }
+    fn switched(what: DependsOn, value: Vec<f64>, basis: DMatrix<f64>) -> Driver {
+        Driver { what, only_at: None, value, basis: Arc::new(basis), kernel: None }
     }
 }
 
@@ -73,18 +55,18 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     let column = |f: &dyn Fn(&crate::DwellRow) -> f64| -> Vec<f64> { problem.dwells.iter().map(f).collect() };
     let mut all = Vec::new();
     for j in 0..joints {
-        all.extend(smooth_driver(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Smooth));
+        all.extend(smooth_driver(DependsOn::Angle(j), None, column(&|d| d.joint_rad[j])));
     }
     for j in 0..joints {
-        all.extend(smooth_driver(format!("q{}", j + 1), column(&|d| d.joint_rad[j]), DriverKind::Own(j)));
+        all.extend(smooth_driver(DependsOn::Angle(j), Some(j), column(&|d| d.joint_rad[j])));
     }
     for j in 1..joints.saturating_sub(1) {
         let value = column(&|d| d.joint_rad[j] + d.joint_rad[j + 1]);
-        all.extend(smooth_driver(format!("q{}+q{}", j + 1, j + 2), value, DriverKind::Smooth));
+        all.extend(smooth_driver(DependsOn::AngleSum(j), None, value));
     }
-    all.extend(smooth_driver("t".to_string(), column(&|d| d.time_s), DriverKind::Time));
+    all.extend(smooth_driver(DependsOn::SessionTime, None, column(&|d| d.time_s)));
     let temperatures: Option<Vec<f64>> = problem.dwells.iter().map(|d| d.temperature_c).collect();
-    all.extend(temperatures.and_then(|v| smooth_driver("temperature".to_string(), v, DriverKind::Smooth)));
+    all.extend(temperatures.and_then(|v| smooth_driver(DependsOn::Temperature, None, v)));
     let standard = standardised_joints(problem);
     let with_pose = |value: &[f64]| {
         DMatrix::from_fn(value.len(), joints + 1, |i, k| {
@@ -95,7 +77,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
         let value = column(&|d| d.arrival[j]);
         if is_varying(&value) {
             let basis = with_pose(&value);
-            all.push(Driver::switched(&format!("s{}", j + 1), DriverKind::Direction(j), value, basis));
+            all.push(Driver::switched(DependsOn::Direction(j), value, basis));
             all.extend(direction_along(problem, j));
         }
     }
@@ -103,7 +85,7 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
     if is_varying(&load) {
         let (mean, sd) = mean_and_sd(&load);
         let basis = with_pose(&load.iter().map(|v| (v - mean) / sd).collect::<Vec<_>>());
-        all.push(Driver::switched("load", DriverKind::Load, load, basis));
+        all.push(Driver::switched(DependsOn::Load, load, basis));
     }
     let recordings: BTreeSet<usize> = problem.dwells.iter().map(|d| d.id.recording).collect();
     if recordings.len() > 1 {
@@ -111,15 +93,14 @@ pub(crate) fn drivers(problem: &Problem) -> Vec<Driver> {
             f64::from(recordings.iter().nth(k) == Some(&problem.dwells[i].id.recording))
         });
         let value = column(&|d| d.id.recording as f64);
-        all.push(Driver::switched("recording", DriverKind::Recording, value, basis));
+        all.push(Driver::switched(DependsOn::Recording, value, basis));
     }
     all
 }
 
 fn direction_along(problem: &Problem, joint: usize) -> Option<Driver> {
     let angle = problem.dwells.iter().map(|d| d.joint_rad[joint]).collect();
-    let (name, kind) = (format!("s{0}*q{0}", joint + 1), DriverKind::DirectionAlong(joint));
-    let mut driver = smooth_driver(name, angle, kind)?;
+    let mut driver = smooth_driver(DependsOn::AngleByDirection(joint), Some(joint), angle)?;
     for (d, mut row) in problem.dwells.iter().zip(Arc::make_mut(&mut driver.basis).row_iter_mut()) {
         row *= d.arrival[joint];
     }
@@ -154,14 +135,14 @@ pub(crate) fn mean_and_sd(value: &[f64]) -> (f64, f64) {
     (mean, (value.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
 }
 
-fn smooth_driver(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driver> {
+fn smooth_driver(what: DependsOn, only_at: Option<usize>, value: Vec<f64>) -> Option<Driver> {
     if !is_varying(&value) {
         return None;
     }
-    let (lengths, bins, functions) = match kind {
-        DriverKind::Time => (TIME_LENGTHS, FINE_BINS, TIME_FUNCTIONS),
-        DriverKind::DirectionAlong(_) => (ALONG_LENGTHS, FINE_BINS, ALONG_FUNCTIONS),
-        DriverKind::Own(_) => {
+    let (lengths, bins, functions) = match what {
+        DependsOn::SessionTime => (TIME_LENGTHS, FINE_BINS, TIME_FUNCTIONS),
+        DependsOn::AngleByDirection(_) => (ALONG_LENGTHS, FINE_BINS, ALONG_FUNCTIONS),
+        DependsOn::Angle(_) if only_at.is_some() => {
             let [fewest, most] = FINE_FUNCTIONS;
             (FINE_LENGTHS, FINE_BINS, (value.len() / DWELLS_A_FUNCTION).clamp(fewest, most))
         }
@@ -172,7 +153,7 @@ fn smooth_driver(name: String, value: Vec<f64>, kind: DriverKind) -> Option<Driv
     for (i, v) in value.iter().enumerate() {
         basis.set_row(i, &kernel.at(*v).transpose());
     }
-    Some(Driver { name, kind, value, basis: Arc::new(basis), kernel: Some(kernel) })
+    Some(Driver { what, only_at, value, basis: Arc::new(basis), kernel: Some(kernel) })
 }
 
 /// Leading functions of a mixture of two squared-exponential kernels over the range of the data (Nystroem on a grid,

@@ -9,6 +9,7 @@ pub(crate) mod evidence;
 pub(crate) mod scatter;
 
 use crate::config::DiagnosisConfig;
+use crate::enters::DependsOn;
 use crate::problem::grams::each_gram;
 use crate::problem::projection::{Gram, Projection};
 use crate::problem::{Candidate, Columns, EFFECT_PRECISION, Problem};
@@ -233,7 +234,8 @@ impl Weighed {
     /// which they are least like those before them. A shape over time would take in what is alike over time.
     pub fn scatter(&self, problem: &Problem, config: &DiagnosisConfig) -> Scatter {
         let listed = self.entries.iter().map(|e| (&e.candidate.columns, e.ln_evidence));
-        let timeless = |u: &&Outside| !["t", "time", "recording"].contains(&u.what.driver_name.as_str());
+        let of_time = [DependsOn::SessionTime, DependsOn::Time, DependsOn::Recording];
+        let timeless = |u: &&Outside| !of_time.contains(&u.what.depends);
         let unlisted = self.unlisted.iter().filter(timeless).map(|u| (&u.what.columns, u.ln_evidence));
         let beside = |columns: &Columns| {
             let dense = self.dense(columns, problem);

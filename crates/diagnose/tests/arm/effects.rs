@@ -2,7 +2,7 @@
 
 use super::{GEOMETRY, Pose, fk};
 use armcal_core::Unit;
-use armcal_diagnose::Toggle;
+use armcal_diagnose::{DependsOn, EntersAt, Toggle};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -185,19 +185,31 @@ pub fn catalogue(poses: &[Pose]) -> Vec<Listed> {
 }
 
 /// Effects outside the catalogue, with the channel and driver that are right.
-pub fn outside(deg_scale: f64) -> Vec<(&'static str, &'static str, &'static str, Effect)> {
+pub fn outside(deg_scale: f64) -> Vec<(&'static str, EntersAt, DependsOn, Effect)> {
+    use DependsOn::{Angle, Direction, SessionTime};
+    use EntersAt::Joint;
     let deg = std::f64::consts::PI / 180.0 * deg_scale;
     vec![
-        ("cable", "joint2", "q1", on_joint(1, move |p, _, _| 0.4 * deg * ((p.q[0] - 0.1) / 0.06).tanh())),
-        ("worn", "joint1", "s1", on_joint(0, move |p, _, _| -0.3 * deg * p.s[0] * (1.0 + 4.0 * p.q[0]))),
-        ("crossed", "joint3", "s2", on_joint(2, move |p, _, _| -0.3 * deg * p.s[1])),
-        ("cycling", "joint2", "t", on_joint(1, move |p, _, span| 0.3 * deg * (12.0 * p.time / span).sin())),
+        ("cable", Joint(1), Angle(0), on_joint(1, move |p, _, _| 0.4 * deg * ((p.q[0] - 0.1) / 0.06).tanh())),
+        (
+            "worn",
+            Joint(0),
+            Direction(0),
+            on_joint(0, move |p, _, _| -0.3 * deg * p.s[0] * (1.0 + 4.0 * p.q[0])),
+        ),
+        ("crossed", Joint(2), Direction(1), on_joint(2, move |p, _, _| -0.3 * deg * p.s[1])),
+        (
+            "cycling",
+            Joint(1),
+            SessionTime,
+            on_joint(1, move |p, _, span| 0.3 * deg * (12.0 * p.time / span).sin()),
+        ),
         (
             "bump",
-            "joint1",
-            "q1",
+            Joint(0),
+            Angle(0),
             on_joint(0, move |p, _, _| 0.5 * deg * (-((p.q[0] - 0.05) / 0.05).powi(2)).exp()),
         ),
-        ("twist", "joint3", "q1", on_joint(2, move |p, _, _| 0.4 * deg * (9.0 * p.q[0]).sin())),
+        ("twist", Joint(2), Angle(0), on_joint(2, move |p, _, _| 0.4 * deg * (9.0 * p.q[0]).sin())),
     ]
 }

@@ -258,6 +258,7 @@ pub fn problem(
             aliases: Vec::new(),
             known: Option::None,
             amplitudes: amplitude(l),
+            per_turn: Option::None,
             toggle: l.toggle,
             columns: Columns::Dense(Arc::new(effect_columns(&l.effect, &l.typical))),
         })
@@ -319,6 +320,7 @@ fn periodic_scan(poses: &[Pose], j: usize, joint: &Arc<DMatrix<f64>>) -> Scan {
                     never_negative: false,
                 })
                 .collect(),
+            per_turn: Some(nu),
             toggle: Toggle::None,
             columns: Columns::Product { base: joint.clone(), basis: Arc::new(basis), size: 1.0 },
         }
@@ -332,7 +334,7 @@ fn channels(joint: &[Arc<DMatrix<f64>>], columns: &Make<'_>) -> Vec<Channel> {
     let mut all = Vec::new();
     let mut add = |name: &str, unit, axes: &[&str], columns: Arc<DMatrix<f64>>| {
         all.push(Channel {
-            name: name.into(),
+            enters: name.to_owned().into(),
             unit,
             axes: axes.iter().map(|a| a.to_string()).collect(),
             columns,

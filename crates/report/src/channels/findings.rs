@@ -31,7 +31,7 @@ pub(super) fn put(run: &Run, f: &Findings, out: &mut Messages) {
         let effects = proto::EffectTable { timestamp: stamp(), ..f.effects.clone() };
         out.put("/armcal/effect_table", begin_ns, &effects);
     }
-    for (number, curve) in (1..).zip(&f.curves) {
+    for (number, (_, curve)) in (1..).zip(&f.curves) {
         let message = proto::ErrorCurve { timestamp: stamp(), ..curve.clone() };
         out.put(curve_topic(number), begin_ns, &message);
     }

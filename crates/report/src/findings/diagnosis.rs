@@ -122,7 +122,7 @@ fn unlisted_row(run: &Run, u: &UnknownReport) -> proto::EffectRow {
         effect: "not listed".into(),
         left_out_mm: before_after_text(u.places.before, u.places.after),
         probability: probability_text(u.probability),
-        r#where: printable_name(&format!("{}, over {}", channel_told(&u.channel), driver_told(&u.driver))),
+        r#where: printable_name(&format!("{}, over {}", channel_told(&u.channel), driver_told(u.driver))),
         size: format!("up to {} {}", round_significant(most), curve.unit).trim_end().to_owned(),
         name: u
             .effect()

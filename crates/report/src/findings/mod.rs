@@ -5,9 +5,10 @@
 
 mod diagnosis;
 
+use armcal_diagnose::UnknownReport;
 use armcal_result::analysis::{error_curve, in_time};
 use armcal_result::{Point, Run, Undiagnosed, analysis, proto};
-use armcal_wording::{Story, answer, shown_unlisted};
+use armcal_wording::{Story, answer, channel_told, driver_told, shown_unlisted};
 
 /// Everything a run found.
 pub(crate) struct Findings {
@@ -25,8 +26,9 @@ pub(crate) struct Findings {
     pub diagnosis: Option<(proto::Diagnosis, proto::Candidates)>,
     /// What was found and the candidates as people read them; empty where nothing was looked for.
     pub effects: proto::EffectTable,
-    /// What no name explains, unless that anything does not have one is improbable.
-    pub curves: Vec<proto::ErrorCurve>,
+    /// What no name explains, unless that anything does not have one is improbable, each beside where it enters and what it
+    /// depends on in words.
+    pub curves: Vec<([String; 2], proto::ErrorCurve)>,
     /// Steps of what to do next, and entries of what was found, in words.
     pub next: usize,
     pub told_found: usize,
@@ -63,7 +65,8 @@ impl Findings {
 }
 
 /// The same as curves.
-pub(crate) fn unlisted_curves(run: &Run) -> Vec<proto::ErrorCurve> {
+pub(crate) fn unlisted_curves(run: &Run) -> Vec<([String; 2], proto::ErrorCurve)> {
     let shown = run.diagnosis.iter().flat_map(shown_unlisted);
-    shown.map(|u| error_curve(u, run.model.chain())).collect()
+    let told = |u: &UnknownReport| [channel_told(&u.channel), driver_told(u.driver)];
+    shown.map(|u| (told(u), error_curve(u, run.model.chain()))).collect()
 }

@@ -5,7 +5,6 @@ use crate::channels::curve_topic;
 use crate::findings::Findings;
 use armcal_core::printable_name;
 use armcal_result::proto::ErrorCurve;
-use armcal_wording::{channel_told, driver_told};
 
 // Okabe and Ito's palette, which colour-blind people can tell apart.
 pub(super) const BLUE: Colour = Colour { hex: "#0072B2", name: "blue" };
@@ -91,7 +90,7 @@ fn time_plot(x_path: String, series: Vec<Series>) -> Plot {
 }
 
 /// An error without a name and its band.
-pub(super) fn curve_plot(number: usize, curve: &ErrorCurve) -> Content {
+pub(super) fn curve_plot(number: usize, ([channel, driver], curve): &([String; 2], ErrorCurve)) -> Content {
     let path = |field: &str| format!("{}.{field}[:]", curve_topic(number));
     let series = vec![
         line_series(path("value"), "error", VERMILION),
@@ -101,11 +100,11 @@ pub(super) fn curve_plot(number: usize, curve: &ErrorCurve) -> Content {
     let unit = |unit: &str| if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
     let plot = Plot {
         x_path: path("at"),
-        x_label: format!("{}{}", printable_name(&driver_told(&curve.driver)), unit(&curve.driver_unit)),
+        x_label: format!("{}{}", printable_name(driver), unit(&curve.driver_unit)),
         y_label: format!("error{}", unit(&curve.unit)),
         y_range: None,
         beyond: 0,
         series,
     };
-    Content::plot(&format!("Unlisted, {}", printable_name(&channel_told(&curve.channel))), plot)
+    Content::plot(&format!("Unlisted, {}", printable_name(channel)), plot)
 }

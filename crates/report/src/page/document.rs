@@ -2,12 +2,12 @@
 
 use super::shown::{Shown, drawn_drivers, effect_names};
 use crate::findings::unlisted_curves;
-use armcal_diagnose::{CandidateReport, Diagnosis};
+use armcal_diagnose::{CandidateReport, DependsOn, Diagnosis};
 use armcal_model::find;
 use armcal_result::proto::ErrorCurve;
 use armcal_result::sensitivity::{Basis, Channel, Driver};
 use armcal_result::{Column, RecordingNames, Refit, Run};
-use armcal_wording::{candidate_sizes, channel_told, driver_told};
+use armcal_wording::{candidate_sizes, channel_told};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ pub(crate) struct Document {
     /// Joints and the other places where an error may enter.
     pub channels: Vec<Channel>,
     /// Drivers drawn for each of the first channels; none for a joint that does not move the tip.
-    pub drawn: Vec<Vec<String>>,
+    pub drawn: Vec<Vec<DependsOn>>,
     /// What errors may follow.
     pub drivers: Vec<Driver>,
     /// Direction of arrival, `[joint][dwell]`.
@@ -185,11 +185,11 @@ fn board_maps(run: &Run) -> Vec<Value> {
 }
 
 /// The curve that Foxglove plots, as a line with half its band.
-fn unlisted_shape(curve: ErrorCurve) -> Value {
+fn unlisted_shape(([channel, driver], curve): ([String; 2], ErrorCurve)) -> Value {
     let half = curve.high.iter().zip(&curve.low).map(|(high, low)| (high - low) / 2.0);
     json!({
-        "channel": channel_told(&curve.channel),
-        "driver": driver_told(&curve.driver),
+        "channel": channel,
+        "driver": driver,
         "driver_unit": curve.driver_unit,
         "unit": curve.unit,
         "at": Column::of_all(curve.at),

@@ -3,8 +3,11 @@
 use armcal_calibrate::{Calibration, Estimate, PairedDifference, SideErrors};
 use armcal_core::ErrorStats;
 use armcal_core::units::format_mm;
+use armcal_diagnose::{DependsOn, EntersAt};
 use armcal_model::Model;
-use armcal_result::sensitivity::{Band, Basis, Group, Signature, bands, drivers_of, groups, signatures};
+use armcal_result::sensitivity::{
+    Band, Basis, Channel, Group, Signature, bands, drivers_of, groups, signatures,
+};
 use armcal_result::{Column, Refit, Run, role_word};
 use armcal_wording::{conclusion, estimate_shown, pool_story};
 use nalgebra::Vector3;
@@ -71,7 +74,7 @@ impl Shown {
             judged.map(|(r, e)| (r.held_out || !any_held_out).then_some(*e)).collect();
         let channels = basis.sensitivity.channels.len();
         let drawn: Vec<usize> =
-            (0..channels).filter(|c| !basis.sensitivity.channels[*c].key.starts_with("world")).collect();
+            (0..channels).filter(|c| !is_world(&basis.sensitivity.channels[*c])).collect();
         let implied: Vec<Vec<Option<f64>>> =
             drawn.iter().map(|c| basis.sensitivity.implied(*c, &residuals_m)).collect();
         let in_board = |axis: usize| {
@@ -101,9 +104,14 @@ impl Shown {
 }
 
 /// Drivers drawn for each channel that has implied errors on the page.
-pub(crate) fn drawn_drivers(basis: &Basis) -> Vec<Vec<String>> {
-    let drawn = basis.sensitivity.channels.iter().take_while(|c| !c.key.starts_with("world"));
+pub(crate) fn drawn_drivers(basis: &Basis) -> Vec<Vec<DependsOn>> {
+    let drawn = basis.sensitivity.channels.iter().take_while(|c| !is_world(c));
     drawn.enumerate().map(|(c, _)| drivers_of(basis, c)).collect()
+}
+
+/// Whether a channel is an axis of the world.
+fn is_world(channel: &Channel) -> bool {
+    matches!(channel.key, EntersAt::WorldAxis(_))
 }
 
 /// The effects of a model as a pipeline names them.

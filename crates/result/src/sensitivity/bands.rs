@@ -3,6 +3,7 @@
 use super::basis::Basis;
 use crate::column::Column;
 use armcal_calibrate::grouped_ci95;
+use armcal_diagnose::DependsOn;
 use serde::Serialize;
 
 /// Points a bin holds at least.
@@ -18,7 +19,7 @@ pub struct Band {
     /// Index of the channel.
     pub channel: usize,
     /// Key of the driver.
-    pub driver: String,
+    pub driver: DependsOn,
     /// 1, -1 or 0 (not known) for a joint, `null` where directions do not matter.
     pub direction: Option<i8>,
     /// Mean driver of each bin.
@@ -30,25 +31,25 @@ pub struct Band {
 }
 
 /// Which drivers are drawn for a channel; none for one that is not drawn.
-pub fn drivers_of(basis: &Basis, channel: usize) -> Vec<String> {
+pub fn drivers_of(basis: &Basis, channel: usize) -> Vec<DependsOn> {
     if !basis.drawn[channel] {
         return Vec::new();
     }
-    let keys: Vec<String> = match basis.sensitivity.channels[channel].joint {
-        Some(j) => vec![format!("q{}", j + 1), format!("tau{}", j + 1), "time".into()],
-        None => ["time", "temperature", "load"].map(str::to_owned).to_vec(),
+    let keys = match basis.sensitivity.channels[channel].joint {
+        Some(j) => [DependsOn::Angle(j), DependsOn::Torque(j), DependsOn::Time],
+        None => [DependsOn::Time, DependsOn::Temperature, DependsOn::Load],
     };
-    keys.into_iter().filter(|key| basis.driver(key).is_some()).collect()
+    keys.into_iter().filter(|key| basis.driver(*key).is_some()).collect()
 }
 
 /// All bands of one channel's implied errors.
 pub fn bands(basis: &Basis, channel: usize, implied: &[Option<f64>]) -> Vec<Band> {
     let keys = drivers_of(basis, channel);
-    keys.iter().flat_map(|key| bands_over(basis, channel, key, implied)).collect()
+    keys.into_iter().flat_map(|key| bands_over(basis, channel, key, implied)).collect()
 }
 
 /// The bands over one driver.
-pub fn bands_over(basis: &Basis, channel: usize, key: &str, implied: &[Option<f64>]) -> Vec<Band> {
+pub fn bands_over(basis: &Basis, channel: usize, key: DependsOn, implied: &[Option<f64>]) -> Vec<Band> {
     let Some(driver) = basis.driver(key) else { return Vec::new() };
     let joint = basis.sensitivity.channels[channel].joint;
     let x = &basis.drivers[driver].values.0;
@@ -56,7 +57,7 @@ pub fn bands_over(basis: &Basis, channel: usize, key: &str, implied: &[Option<f6
         Some(_) => [1, -1, 0].map(Some).to_vec(),
         None => vec![None],
     };
-    let cuts: &[f64] = if key == "time" { &basis.time_cuts } else { &[] };
+    let cuts: &[f64] = if key == DependsOn::Time { &basis.time_cuts } else { &[] };
     let mut all = Vec::new();
     for direction in directions {
         let of_it = |i: usize| direction.is_none_or(|d| joint.is_some_and(|j| basis.arrival[j][i] == d));
@@ -64,7 +65,7 @@ pub fn bands_over(basis: &Basis, channel: usize, key: &str, implied: &[Option<f6
         let [x, mean, half] = bin_means(points.collect(), cuts);
         if !x.is_empty() {
             let (x, mean, half) = (Column::of(x), Column::of(mean), Column::of(half));
-            all.push(Band { channel, driver: key.to_owned(), direction, x, mean, half });
+            all.push(Band { channel, driver: key, direction, x, mean, half });
         }
     }
     all

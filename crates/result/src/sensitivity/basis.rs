@@ -4,6 +4,7 @@ use super::of_dwells::{Sensitivities, joint_units};
 use crate::analysis::feels_gravity;
 use crate::column::Column;
 use crate::run::Run;
+use armcal_diagnose::DependsOn;
 use armcal_model::Masses;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -35,7 +36,7 @@ pub struct Basis {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Driver {
     /// Name for programs: `q1`, `tau1`, `time`, `temperature`, `load`.
-    pub key: String,
+    pub key: DependsOn,
     /// Name for people, with its unit.
     pub label: String,
     /// The joint it belongs to.
@@ -75,7 +76,7 @@ impl Basis {
     }
 
     /// Index of a driver.
-    pub(crate) fn driver(&self, key: &str) -> Option<usize> {
+    pub(crate) fn driver(&self, key: DependsOn) -> Option<usize> {
         self.drivers.iter().position(|d| d.key == key)
     }
 }
@@ -88,7 +89,7 @@ fn drivers(run: &Run) -> Vec<Driver> {
     let mut all = Vec::new();
     for (j, (name, unit)) in names.iter().zip(&units).enumerate() {
         all.push(Driver {
-            key: format!("q{}", j + 1),
+            key: DependsOn::Angle(j),
             label: format!("{name} [{}]", unit.display_symbol()),
             joint: Some(j),
             values: Column::of_all(driven.iter().map(|d| unit.to_display(d.joint_rad(j)))),
@@ -104,25 +105,28 @@ fn drivers(run: &Run) -> Vec<Driver> {
     let felt = feels_gravity(&torques_nm);
     for (j, name) in names.iter().enumerate().filter(|(j, _)| felt[*j]) {
         all.push(Driver {
-            key: format!("tau{}", j + 1),
+            key: DependsOn::Torque(j),
             label: format!("gravity torque on {name}, {masses} [N m]"),
             joint: Some(j),
             values: Column::of_all(torques_nm[j].iter().copied()),
         });
     }
-    let whole =
-        |key: &str, label: &str, values| Driver { key: key.into(), label: label.into(), joint: None, values };
+    let whole = |key, label: &str, values| Driver { key, label: label.into(), joint: None, values };
     let time = run.recorded_time();
     let label = match time.begins().0.iter().flatten().count() {
         0 | 1 => "time since the first dwell [min]",
         _ => "recorded time, without the time between recordings [min]",
     };
-    all.push(whole("time", label, Column::of_all(run.observations.iter().map(|o| time.at_min(o)))));
+    all.push(whole(DependsOn::Time, label, Column::of_all(run.observations.iter().map(|o| time.at_min(o)))));
     let temperature = Column::of(run.observations.iter().map(|o| o.temperature_c));
-    all.push(whole("temperature", "temperature [°C]", temperature));
+    all.push(whole(DependsOn::Temperature, "temperature [°C]", temperature));
     let elsewhere = run.observations.iter().any(|o| !o.more_loads.is_empty());
     let label = if elsewhere { "all loads on the arm [kg]" } else { "load at the tip [kg]" };
-    all.push(whole("load", label, Column::of_all(run.observations.iter().map(|o| o.all_loads_kg()))));
+    all.push(whole(
+        DependsOn::Load,
+        label,
+        Column::of_all(run.observations.iter().map(|o| o.all_loads_kg())),
+    ));
     all.retain(is_varying);
     all
 }
@@ -130,7 +134,7 @@ fn drivers(run: &Run) -> Vec<Driver> {
 /// Whether a driver moves at all; a joint's angle and time always belong on an axis.
 fn is_varying(driver: &Driver) -> bool {
     let size = driver.values.0.iter().flatten().fold(0.0, |size: f64, v| size.max(v.abs()));
-    driver.key == "time" || driver.key.starts_with('q') || spread(driver) > SMALLEST_SPREAD * size
+    matches!(driver.key, DependsOn::Time | DependsOn::Angle(_)) || spread(driver) > SMALLEST_SPREAD * size
 }
 
 /// Largest minus smallest value.

@@ -8,6 +8,7 @@ use crate::run::Run;
 use armcal_calibrate::{BLURRED, PositionNoise, implied_joint_errors};
 use armcal_core::robust::median;
 use armcal_core::{Observation, Unit};
+use armcal_diagnose::EntersAt;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -15,7 +16,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Channel {
     /// Name for programs: `joint1`, `lengths`, `world.x`.
-    pub key: String,
+    pub key: EntersAt,
     /// Name for people.
     pub label: String,
     /// Unit of its errors.
@@ -92,16 +93,16 @@ impl Sensitivities {
 fn channels(run: &Run) -> Vec<Channel> {
     let chain = run.model.chain();
     let joint = |(index, (name, unit)): (usize, (&String, armcal_core::Unit))| Channel {
-        key: format!("joint{}", index + 1),
+        key: EntersAt::Joint(index),
         label: name.clone(),
         unit: unit.display_symbol(),
         joint: Some(index),
     };
     let joints = chain.joint_names().iter().zip(joint_units(run)).enumerate().map(joint);
-    let whole = |key: &str, label: String, unit| Channel { key: key.into(), label, unit, joint: None };
-    let lengths = whole("lengths", "all lengths of the arm".into(), "ppm");
+    let whole = |key, label, unit| Channel { key, label, unit, joint: None };
+    let lengths = whole(EntersAt::Lengths, "all lengths of the arm".into(), "ppm");
     let world =
-        ["x", "y", "z"].map(|a| whole(&format!("world.{a}"), format!("tip along {a} of the world"), "mm"));
+        ['x', 'y', 'z'].map(|a| whole(EntersAt::WorldAxis(a), format!("tip along {a} of the world"), "mm"));
     joints.chain([lengths]).chain(world).collect()
 }
 

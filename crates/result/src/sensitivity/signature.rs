@@ -11,6 +11,7 @@ use super::bands::{Band, bands_over};
 use super::basis::Basis;
 use crate::column::Column;
 use crate::run::{Refit, Run};
+use armcal_diagnose::DependsOn;
 use armcal_model::{Family, PlacedEffect};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -32,7 +33,7 @@ pub struct Signature {
     /// Index of the channel.
     pub channel: usize,
     /// Key of the driver.
-    pub driver: String,
+    pub driver: DependsOn,
     /// Share of the effect that the channel shows, squared, 0 to 1.
     pub share: f64,
     /// What the effect does in each dwell, in the channel's unit.
@@ -70,18 +71,18 @@ fn effect_signature(run: &Run, basis: &Basis, refit: &Refit, effect: &PlacedEffe
     let effect_is = basis.sensitivity.implied(channel, &difference_m);
     let driver = match effect.spec.since {
         // What else changed at that moment, the temperature for one, is no cause of an event.
-        Some(_) => basis.driver("time"),
+        Some(_) => basis.driver(DependsOn::Time),
         None => best_driver(basis, channel, effect.kind.family, &effect_is),
     }?;
     let residuals = refit.calibration.residuals.iter().zip(&difference_m);
     let partial_m: Vec<Vector3<f64>> = residuals.map(|(r, d)| r.fitted_m + d).collect();
     let measured = basis.sensitivity.implied(channel, &partial_m);
-    let key = &basis.drivers[driver].key;
+    let key = basis.drivers[driver].key;
     Some(Signature {
         effect: effect.spec.to_string(),
         summary: effect_summary(run, effect),
         channel,
-        driver: key.clone(),
+        driver: key,
         share,
         bands: bands_over(basis, channel, key, &measured),
         measured: Column::of(measured),
@@ -115,10 +116,12 @@ fn best_channel(
 /// torque first.
 fn best_driver(basis: &Basis, channel: usize, family: Family, effect: &[Option<f64>]) -> Option<usize> {
     let joint = basis.sensitivity.channels[channel].joint;
-    let own = |key: &str| joint.and_then(|j| basis.driver(&format!("{key}{}", j + 1)));
-    let [one, other] = if family == Family::Elasticity { ["tau", "q"] } else { ["q", "tau"] };
-    let first = [own(one), own(other), basis.driver("temperature"), basis.driver("time")];
-    let mut order: Vec<usize> = first.into_iter().flatten().collect();
+    let mut own = joint.map_or(Vec::new(), |j| vec![DependsOn::Angle(j), DependsOn::Torque(j)]);
+    if family == Family::Elasticity {
+        own.reverse();
+    }
+    let first = own.into_iter().chain([DependsOn::Temperature, DependsOn::Time]);
+    let mut order: Vec<usize> = first.filter_map(|key| basis.driver(key)).collect();
     order.extend((0..basis.drivers.len()).filter(|d| !order.contains(d)).collect::<Vec<_>>());
     let left: Vec<f64> = order.iter().map(|d| residual_variance_ratio(basis, joint, *d, effect)).collect();
     let best = left.iter().copied().fold(f64::INFINITY, f64::min);

@@ -108,9 +108,9 @@ pub struct AmplitudeSummary {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct UnlistedSummary<'a> {
     /// Where it enters.
-    pub channel: &'a str,
+    pub channel: String,
     /// What it depends on.
-    pub driver: &'a str,
+    pub driver: String,
     /// Its shape as a formula; empty where none reaches it.
     pub expression: &'a str,
     /// What the formula acts on.
