@@ -185,6 +185,8 @@ codes! {
     SetpointsRecorded = "setpoints-recorded",
     /// The field that is read holds something else.
     WrongField = "wrong-field",
+    /// A joint's axis in the model is another one.
+    ModelAxis = "model-axis",
     /// Stamps are not when things happened.
     StampsWrong = "stamps-wrong",
     /// Two streams have each other's names.

@@ -62,6 +62,12 @@ impl PoseSamples {
         self.len() > 1 && (self.len() - 1) as f64 / (span_ns as f64 * 1e-9) < FEW_PER_S
     }
 
+    /// Stamps of a clock that runs so many times as fast as time, on one that does not; the first stays.
+    pub fn slow_down(&mut self, rate: f64) {
+        let first = self.time_ns.first().copied().unwrap_or_default();
+        self.time_ns.iter_mut().for_each(|t| *t = first + ((*t - first) as f64 / rate).round() as i64);
+    }
+
     /// How far its clock is ahead of that of the joints, if messages of both were logged as soon as they were stamped [s].
     pub fn clock_ahead_s(&self, joints: &JointSamples) -> Option<f64> {
         Some(self.ahead_of_log_s? - joints.ahead_of_log_s?)

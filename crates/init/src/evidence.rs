@@ -6,6 +6,7 @@ use super::read::{AllRead, Read};
 use armcal_core::robust::{median, percentile};
 use armcal_core::{Pose, PoseSamples};
 use armcal_dwell::mean_pose;
+use armcal_stages::CLOCK_RATES;
 use armcal_stages::links::{Placed, place_on_link, turned_apart};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -160,6 +161,33 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
 
 /// Clocks that are further apart by log time are of other epochs [s].
 const EPOCH_S: f64 = 1.0;
+
+/// The clock of a body that moves with the arm only if its stamps ran so many times as fast; by its number.
+pub fn clock_rates(arm: &Arm, read: &AllRead, evidence: &[Evidence]) -> Vec<(usize, f64)> {
+    let nominal = arm.model.nominal();
+    let rate = |at: usize| {
+        if evidence[at].likeness().is_none_or(|l| l.correlation > UNLIKE) {
+            return None;
+        }
+        let (recording, seen) = read.recordings.iter().find_map(|r| Some((r, r.body(at)?)))?;
+        let joints = &recording.samples.joints;
+        let tip_m = |i: usize| arm.model.tip_in_base(&nominal, &joints.row_rad(i)).translation.vector;
+        let speeds = Speeds::of(&joints.time_ns, tip_m);
+        let alike = |rate: f64| {
+            let mut slowed = seen.clone();
+            slowed.slow_down(rate);
+            let own = Speeds::of(&slowed.time_ns, |i| slowed.position_m[i]);
+            Some((compare_speeds(&speeds, &own)?.correlation, rate))
+        };
+        let best = CLOCK_RATES.into_iter().filter_map(alike).max_by(|a, b| a.0.total_cmp(&b.0));
+        best.filter(|(correlation, _)| *correlation > SURELY_ALIKE).map(|(_, rate)| (at, rate))
+    };
+    (0..evidence.len()).filter_map(rate).collect()
+}
+
+/// Speeds that are no more alike than this are not of one motion; those that are more alike than that surely are.
+const UNLIKE: f64 = 0.5;
+const SURELY_ALIKE: f64 = 0.85;
 
 /// A body that stays within this stands still [m].
 pub const STANDS_M: f64 = 0.01;

@@ -44,6 +44,8 @@ use channels::Channels;
 use known::Known;
 use std::path::{Path, PathBuf};
 
+/// Mistakes that are undone one after the other.
+const MOST_MENDED: usize = 3;
 /// Pauses below which nothing can be calibrated.
 const FEWEST_PAUSES: usize = 6;
 
@@ -78,19 +80,25 @@ pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitErro
     Ok(last.ok().filter(|last| last.is_plausible()).unwrap_or(as_seen))
 }
 
-/// A proposal, and the one in which the mistakes that its trial showed are undone, where that is the better one.
-fn mended(asked: &Asked, taken: Taken, progress: &dyn Steps) -> Result<Proposal, InitError> {
-    let first = propose_taken(asked, &taken, progress)?;
-    let Some(Ok(tried)) = &first.tried else { return Ok(first) };
-    let mut streams = first.pipeline.streams.clone();
-    let undone = !tried.mends.is_empty()
-        && tried.mends.iter().all(|mend| mend.as_ref().is_some_and(|mend| streams.mend(mend)));
-    if !undone {
-        return Ok(first);
+/// A proposal, and the one in which the mistakes that its trial showed are undone, one after the other, while each is the better one.
+fn mended(asked: &Asked, mut taken: Taken, progress: &dyn Steps) -> Result<Proposal, InitError> {
+    let mut best = propose_taken(asked, &taken, progress)?;
+    for _ in 0..MOST_MENDED {
+        let Some(Ok(tried)) = &best.tried else { break };
+        let mut streams = best.pipeline.streams.clone();
+        let undone = !tried.mends.is_empty()
+            && tried.mends.iter().all(|mend| mend.as_ref().is_some_and(|mend| streams.mend(mend)));
+        if !undone {
+            break;
+        }
+        taken.mended = Some(streams);
+        taken.why.extend(tried.mistakes.iter().cloned());
+        match propose_taken(asked, &taken, progress) {
+            Ok(again) if again.error_m() < best.error_m() => best = again,
+            _ => break,
+        }
     }
-    let why = tried.mistakes.clone();
-    let again = propose_taken(asked, &Taken { mended: Some(streams), why, ..taken }, progress);
-    Ok(again.ok().filter(|again| again.error_m() < first.error_m()).unwrap_or(first))
+    Ok(best)
 }
 
 /// How the recordings are taken, beside what they show by themselves.
@@ -132,7 +140,7 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
     let folders = paths.filter_map(|p| p.parent()).map(Path::to_owned).collect();
     let arm = arm::find(&asked.told, &channels, &folders, &asked.out.with_extension("urdf"))?;
     progress.step("reading the recordings");
-    let read = read::read_recordings(&arm, &channels, &opened, taken.mended.as_ref())?;
+    let mut read = read::read_recordings(&arm, &channels, &opened, taken.mended.as_ref())?;
     let pauses: usize = read.recordings.iter().map(|r| r.dwells.len()).sum();
     if pauses < FEWEST_PAUSES {
         let problem = format!(
@@ -144,7 +152,11 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
     }
     progress.step("comparing motions");
     let board = asked.board.as_deref().map(read_board).transpose()?;
-    let evidence = evidence::gather(&arm, &read);
+    let mut evidence = evidence::gather(&arm, &read);
+    for (body, rate) in evidence::clock_rates(&arm, &read, &evidence) {
+        read.set_clock_rate(body, rate);
+        evidence = evidence::gather(&arm, &read);
+    }
     let (cast, seats) = roles::assign_roles(&arm, &evidence, board.as_ref(), taken.at_end);
     let tracked = !points.is_empty()
         || cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);

@@ -52,6 +52,16 @@ pub struct AllRead {
     pub left: Vec<(String, String)>,
 }
 
+impl AllRead {
+    /// Takes the stamps of a body for those of a clock that runs so many times as fast as time.
+    pub fn set_clock_rate(&mut self, body: usize, rate: f64) {
+        let key = body_key(body);
+        self.streams.bodies.get_mut(&key).into_iter().for_each(|stream| stream.clock_rate = Some(rate));
+        let seen = self.recordings.iter_mut().filter_map(|r| r.samples.bodies.get_mut(&key));
+        seen.for_each(|seen| seen.slow_down(rate));
+    }
+}
+
 /// The name of a body while nobody knows its role.
 pub fn body_key(body: usize) -> String {
     format!("b{body:03}")
@@ -130,8 +140,9 @@ fn take_mends(streams: &mut Streams, mended: &Streams) {
     for own in streams.bodies.values_mut() {
         let same = |m: &&&PoseStream| (&m.topic, &m.body, &m.frame) == (&own.topic, &own.body, &own.frame);
         if let Some(mended) = all.iter().find(same) {
-            let PoseStream { axes, orientation_axes, invert, .. } = **mended;
+            let PoseStream { axes, orientation_axes, invert, clock_rate, .. } = **mended;
             (own.axes, own.orientation_axes, own.invert) = (axes, orientation_axes, invert);
+            own.clock_rate = clock_rate;
         }
     }
 }

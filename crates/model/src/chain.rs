@@ -7,9 +7,10 @@ mod urdf;
 
 use crate::ModelError;
 use crate::error::most_similar;
-use crate::segment::{Motion, Segment};
+use crate::segment::{Geometry, Motion, Segment};
 use crate::tree::{SegmentId, Tree};
 use armcal_core::{Parameter, Unit};
+use nalgebra::Vector3;
 
 pub use arms::Arm;
 pub use dh_toml::DhRow;
@@ -18,6 +19,9 @@ pub use masses::Masses;
 use urdf::UrdfJoint;
 pub(crate) use urdf::with_origins;
 pub use urdf::{check_xml, roll_pitch_yaw_of, three_numbers};
+
+/// Component of a unit vector from which on it is one of the axes (2.5 deg).
+const ALONG: f64 = 0.999;
 
 /// A serial arm from base to last link, read from a DH table or a URDF.
 ///
@@ -77,6 +81,30 @@ impl Chain {
         let own = |s: &Segment| s.joint.filter(|j| j.index == joint && j.mimic.is_none());
         let slides = |s: &Segment| own(s).is_some_and(|j| j.motion == Motion::Prismatic);
         if self.segments.iter().any(slides) { Unit::Metre } else { Unit::Radian }
+    }
+
+    /// The axis of a joint of a URDF, in the frame of its origin; none of a DH row.
+    pub fn joint_axis(&self, joint: usize) -> Option<Vector3<f64>> {
+        self.segments.iter().find_map(|s| s.axis_of(joint).copied())
+    }
+
+    /// The same arm with another axis of a joint of its URDF.
+    pub fn with_joint_axis(mut self, joint: usize, axis: Vector3<f64>) -> Chain {
+        for segment in &mut self.segments {
+            if segment.axis_of(joint).is_some() {
+                segment.geometry = Geometry::Axis(axis);
+            }
+        }
+        self
+    }
+
+    /// The parameter that is the zero of a joint, and the sign with which it adds to the reading; none where no one parameter is.
+    pub fn joint_zero(&self, joint: usize) -> Option<(&Parameter, f64)> {
+        let name = self.joint_names.get(joint)?;
+        let of = |quantity: &str| self.parameters.iter().find(|p| p.name == format!("{name}.{quantity}"));
+        let Some(axis) = self.joint_axis(joint) else { return Some((of("theta")?, 1.0)) };
+        let along = (0..3).find(|k| axis[*k].abs() > ALONG)?;
+        Some((of(["rx", "ry", "rz"][along])?, axis[along].signum()))
     }
 
     /// The geometric parameters, in the order of the chain.

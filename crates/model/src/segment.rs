@@ -160,6 +160,15 @@ impl<D: Scalar> Parts<D> {
 }
 
 impl Segment {
+    /// Its axis, if it is that of a URDF's joint and reads it itself.
+    pub fn axis_of(&self, joint: usize) -> Option<&Vector3<f64>> {
+        let own = self.joint.is_some_and(|j| j.index == joint && j.mimic.is_none());
+        match &self.geometry {
+            Geometry::Axis(axis) if own => Some(axis),
+            _ => None,
+        }
+    }
+
     /// What is constant before and behind the motion of its joint: `transform = before * motion * behind`.
     pub fn parted(&self, p: &[f64]) -> (Rigid<f64>, Rigid<f64>) {
         let parts = self.parts(&p[self.parameters.clone()]);

@@ -116,11 +116,14 @@ pub fn setup_finding(
 fn mending_keys(h: &Hypothesis, after: &Side<'_>) -> Option<Mend> {
     match h.mending.as_ref()? {
         Mending::Keys(mend) => Some(mend.clone()),
-        Mending::Zero(joint) => {
-            let (fitted, own) = (after.fitted?, h.estimated.first()?);
-            let e = fitted.calibration.fit.estimates.iter().find(|e| e.parameter.name == own.parameter)?;
-            let joints = fitted.geometry.chain().joint_names().len();
-            Some(Mend::of_reading(*joint, joints, 1.0, e.value - own.nominal))
+        Mending::Zeros { of, known: (factors, zeros_rad) } => {
+            let estimates = &after.fitted?.calibration.fit.estimates;
+            let mut zeros_rad = zeros_rad.clone();
+            for (joint, parameter, sign) in of {
+                let e = estimates.iter().find(|e| e.parameter.name == *parameter)?;
+                zeros_rad[*joint] += sign * (e.value - e.parameter.nominal);
+            }
+            Some(Mend::Readings { factors: factors.clone(), zeros_rad })
         }
     }
 }

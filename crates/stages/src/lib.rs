@@ -33,6 +33,7 @@ pub use error::RunError;
 pub use fit::{Fitted, Inputs, Rounds, fit_places, with_effects};
 pub use placed::{Placed, PlacedBase};
 pub use seen::RecordingData;
+pub use unaligned::CLOCK_RATES;
 
 /// Hears which step begins.
 pub trait Steps {

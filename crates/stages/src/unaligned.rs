@@ -9,6 +9,9 @@ use armcal_core::{FEW_PER_S, JointSamples, PoseSamples, Samples};
 const AGREES: f64 = 0.97;
 /// Correlations this close to each other are the same.
 const SAME: f64 = 1e-3;
+/// Rates of a sensor's clock: its frames stamped as if they came at another rate that sensors have.
+pub const CLOCK_RATES: [f64; 12] =
+    [0.5, 2.0 / 3.0, 0.75, 0.8, 5.0 / 6.0, 1.2, 1.25, 4.0 / 3.0, 1.5, 2.0, 0.25, 4.0];
 /// Ratios of gears and units that are mistaken for none.
 const RATIOS: [f64; 5] = [2.0, 3.0, 5.0, 57.2958, 100.0];
 
@@ -113,6 +116,15 @@ fn of_bodies(now: &Reading, samples: &Samples) -> Vec<(Reading, String)> {
         ));
         let words = format!("[length-unit] with the lengths of the model {words} (the unit of the model)");
         all.push((Reading { lengths: factor, ..now.clone() }, words));
+    }
+    for rate in CLOCK_RATES {
+        let mut changed = now.clone();
+        changed.tip.slow_down(rate);
+        let words = format!(
+            "[clock-rate] with the stamps of the tip taken for those of a clock that runs {rate:.4} times as fast (a rate that was declared \
+             wrongly: `clock_rate = {rate:.4}` under [streams.tip])"
+        );
+        all.push((changed, words));
     }
     for (role, body) in [("base", &samples.base), ("table", &samples.table)] {
         if let Some(body) = body.as_ref().filter(|body| !body.is_empty()) {

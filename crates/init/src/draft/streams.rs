@@ -9,6 +9,7 @@ use crate::roles::Role;
 use crate::seats::table_tilts;
 use crate::topics::BodyTopic;
 use armcal_config::recording_name;
+use armcal_core::PoseSamples;
 use armcal_recording::{Axis, JointUnit, LengthUnit, StreamReport};
 use armcal_table::Tilt;
 use std::collections::BTreeSet;
@@ -169,6 +170,18 @@ impl Draft<'_> {
             }
         }
         self.clock();
+        self.noise_of_one_pose();
+    }
+
+    /// A tip that was seen once a pause shows no scatter.
+    fn noise_of_one_pose(&mut self) {
+        let Some(tip) = self.known.of_role(Role::Tip) else { return };
+        let seen = self.known.read.recordings.iter().filter_map(|r| r.body(tip));
+        if seen.into_iter().any(PoseSamples::is_one_a_stop) {
+            self.page.section("[observations]");
+            self.page
+                .line("sensor_sigma_mm = 0.1", "assumed: one pose a stop shows no scatter; declare yours");
+        }
     }
 
     fn body(&mut self, body: usize, section: &str) {
@@ -193,6 +206,11 @@ impl Draft<'_> {
         }
         if stream.unit == LengthUnit::Mm {
             self.page.line("unit = \"mm\"", "too far away for metres");
+        }
+        if let Some(rate) = stream.clock_rate {
+            let why =
+                "its stamps run so many times as fast as those of the joints: only then do the speeds agree";
+            self.page.line(&format!("clock_rate = {rate:.6}"), why);
         }
         if let Some(axes) = stream.axes {
             self.page.line(&format!("axes = {:?}", axes.map(Axis::word)), UNDONE);

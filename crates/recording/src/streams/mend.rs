@@ -132,11 +132,17 @@ impl PoseStream {
                 ));
             }
         }
+        if self.clock_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
+            return Err("`clock_rate` must be a positive number".to_owned());
+        }
         Ok(())
     }
 
     /// Poses as they would be without the mistakes.
     pub(crate) fn mend_poses(&self, samples: &mut PoseSamples) -> Result<(), String> {
+        if let Some(rate) = self.clock_rate {
+            samples.slow_down(rate);
+        }
         if let Some(axes) = self.axes.map(matrix_of) {
             samples.position_m.iter_mut().for_each(|p| *p = axes * *p);
         }

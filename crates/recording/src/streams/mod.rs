@@ -243,6 +243,9 @@ pub struct PoseStream {
     /// Whether what is published is the pose of the sensor in the body, not of the body in the sensor's frame.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub invert: bool,
+    /// How many times as fast as time its stamps run; 1 when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock_rate: Option<f64>,
     /// Clock; chosen automatically, with its reason recorded, when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub clock: Option<Clock>,

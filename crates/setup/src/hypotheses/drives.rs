@@ -4,9 +4,10 @@
 
 use super::joints::{scale_reading, scaled_readings, shift_reading};
 use super::model::{WIDER, widen_bounds};
-use super::{Estimated, Freedom, Hypothesis};
+use super::zeros::zero_names;
+use super::{Estimated, Freedom, Hypothesis, Mending};
 use armcal_core::units::DEGREES;
-use armcal_core::{Code, Mend, Parameter, Unit};
+use armcal_core::{Code, Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override};
 use armcal_stages::{Change, Inputs};
 use std::collections::BTreeMap;
@@ -97,9 +98,16 @@ fn shares_of_ranges(inputs: &Inputs) -> Vec<Hypothesis> {
         let zero = |range: &[f64; 2]| 0.5 * (range[0] + range[1]) - factor(range) * middle;
         let factors: Vec<f64> = ranges.iter().map(factor).collect();
         let zeros_rad: Vec<f64> = ranges.iter().map(zero).collect();
-        let mend = Mend::Readings { factors: factors.clone(), zeros_rad: zeros_rad.clone() };
+        let known = (factors.clone(), zeros_rad.clone());
+        let mending = match Mending::zeros(inputs, 0..n) {
+            Mending::Zeros { of, .. } => Some(Mending::Zeros { of, known }),
+            other => Some(other),
+        };
         let change = format!("the readings of all joints taken for {words}");
+        // The middle of the range that such an arm was shown is not that of its drawing.
+        let zeros = zero_names(inputs);
         let take = move |i: &mut Inputs| {
+            i.changes.extend(zeros.iter().map(|name| widen_bounds(name)));
             i.each_dwell(|d| {
                 for (j, (factor, zero)) in factors.iter().zip(&zeros_rad).enumerate() {
                     scale_reading(d, j, *factor);
@@ -107,7 +115,7 @@ fn shares_of_ranges(inputs: &Inputs) -> Vec<Hypothesis> {
                 }
             });
         };
-        Hypothesis::new(Code::JointUnit, "all joints", change, RANGE, take).mended_by(mend)
+        Hypothesis { mending, ..Hypothesis::new(Code::JointUnit, "all joints", change, RANGE, take) }
     };
     scales.into_iter().map(hypothesis).collect()
 }

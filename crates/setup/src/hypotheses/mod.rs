@@ -45,8 +45,25 @@ pub struct Hypothesis {
 pub enum Mending {
     /// These keys.
     Keys(Mend),
-    /// The zero of this joint, by what the one estimated parameter comes out as.
-    Zero(usize),
+    /// These zeros of joints, by what their parameters come out as, beside what was known of the readings.
+    Zeros {
+        /// By joint its parameter, and the sign with which that adds to the reading.
+        of: Vec<(usize, String, f64)>,
+        /// A factor a joint, and what is added to each reading [rad].
+        known: (Vec<f64>, Vec<f64>),
+    },
+}
+
+impl Mending {
+    /// The zeros of these joints.
+    fn zeros(inputs: &Inputs, joints: impl IntoIterator<Item = usize>) -> Mending {
+        let n = inputs.chain.joint_names().len();
+        let own = |j: usize| inputs.chain.joint_zero(j).map(|(p, sign)| (j, p.name.clone(), sign));
+        Mending::Zeros {
+            of: joints.into_iter().filter_map(own).collect(),
+            known: (vec![1.0; n], vec![0.0; n]),
+        }
+    }
 }
 
 /// A number of which a few values are tried; the best one is then refined between its neighbours.
@@ -180,6 +197,7 @@ pub fn hypotheses_by_rarity(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hyp
     rarer.extend(zeros::hypotheses(inputs, at_bound));
     rarer.extend(drives::let_go(inputs));
     rarer.extend(model::of_another_size(inputs));
+    rarer.extend(model::of_another_axis(inputs));
     rarer.extend(board::from_the_other_side(inputs));
     [all, rarer]
 }

@@ -8,6 +8,7 @@ use armcal_core::{Against, Code, Parameter, Unit};
 use armcal_model::Arm;
 use armcal_recording::Streams;
 use armcal_stages::{Change, Inputs};
+use nalgebra::Vector3;
 
 const FILE: &str = "mend the model file, or widen the deviation that it allows";
 /// A parameter on its bound is let go this many times as far: from one arm of a make to the next larger one.
@@ -20,6 +21,9 @@ const LONGER_MM: [f64; 15] = [
     -400.0, -300.0, -240.0, -180.0, -120.0, -70.0, -30.0, 0.0, 30.0, 70.0, 120.0, 180.0, 240.0, 300.0, 400.0,
 ];
 const FAR_LONGER_MM: f64 = 15.0;
+const AXIS: &str = "mend its <axis> in the URDF, or its <origin>";
+/// Axes with a smaller product stand across each other.
+const ACROSS: f64 = 0.1;
 /// Parameters smaller than these are zero: their sign says nothing [m], [rad].
 const SMALLEST: f64 = 1e-3;
 
@@ -166,6 +170,26 @@ pub fn of_another_size(inputs: &Inputs) -> Vec<Hypothesis> {
                 let change = format!("{mm:+.1} mm added to {name} (a tool that is longer, or was left out)");
                 nominal_change(Code::ToolLength, &name, change, 1.0, mm * 1e-3)
             }));
+        }
+    }
+    all
+}
+
+/// A joint whose axis is drawn along another one of its frame. Rarer.
+pub fn of_another_axis(inputs: &Inputs) -> Vec<Hypothesis> {
+    let words = [("x", Vector3::x()), ("y", Vector3::y()), ("z", Vector3::z())];
+    let mut all = Vec::new();
+    for (j, name) in inputs.chain.joint_names().iter().enumerate() {
+        let Some(now) = inputs.chain.joint_axis(j) else { continue };
+        // The other sign is that of its reading.
+        for (word, axis) in words.into_iter().filter(|(_, axis)| axis.dot(&now).abs() < ACROSS) {
+            for (sign, minus) in [(1.0, ""), (-1.0, "-")] {
+                let subject = format!("joint {} ({name})", j + 1);
+                let change = format!("the axis of {subject} along {minus}{word} of its frame");
+                all.push(Hypothesis::new(Code::ModelAxis, subject, change, AXIS, move |i| {
+                    i.chain = i.chain.clone().with_joint_axis(j, sign * axis);
+                }));
+            }
         }
     }
     all

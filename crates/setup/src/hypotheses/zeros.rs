@@ -78,6 +78,7 @@ fn by_quarters(inputs: &Inputs, turning: &[usize]) -> Vec<Hypothesis> {
 fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
     let theta = format!("{}.theta", inputs.chain.joint_names()[j]);
     let (subject, n) = (joint_label(inputs, j), inputs.chain.joint_names().len());
+    let mending = Mending::zeros(inputs, [j]);
     let mut all = Vec::new();
     match inputs.chain.parameters().iter().find(|p| p.name == theta) {
         Some(p) => all.extend(ZEROS_DEG.iter().map(|start_deg| {
@@ -86,7 +87,7 @@ fn by_any_angle(inputs: &Inputs, j: usize) -> Vec<Hypothesis> {
             let hypothesis = Hypothesis::new(Code::JointZero, subject.clone(), change, ZERO, move |i| {
                 i.changes.push(Change { plus, ..widen_bounds(&name) });
             });
-            let hypothesis = Hypothesis { mending: Some(Mending::Zero(j)), ..hypothesis };
+            let hypothesis = Hypothesis { mending: Some(mending.clone()), ..hypothesis };
             hypothesis.estimating(Freedom::Number, vec![Estimated::of(p, FAR_ZERO_RAD)])
         })),
         // Where no parameter is the zero of the joint, its readings are shifted.
@@ -149,12 +150,20 @@ fn homing_times(inputs: &Inputs) -> Vec<(Since, String)> {
 
 /// The zeros of all joints, where more than one of them is on its bound.
 fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
-    let is_zero = |p: &Parameter| p.name.ends_with(".theta");
-    let zeros: Vec<Parameter> = inputs.chain.parameters().iter().filter(|p| is_zero(p)).cloned().collect();
-    let far = at_bound.iter().filter(|p| is_zero(p)).map(Estimated::beyond).collect::<Vec<_>>();
+    let zeros = zero_names(inputs);
+    let far: Vec<Estimated> =
+        at_bound.iter().filter(|p| zeros.contains(&p.name)).map(Estimated::beyond).collect();
     (far.len() > 1).then(|| {
         let change = "the zeros of all joints free to leave their bounds";
-        let widen = move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|p| widen_bounds(&p.name)));
-        Hypothesis::new(Code::JointZero, "all joints", change, ZERO, widen).estimating(Freedom::Number, far)
+        let mending = Some(Mending::zeros(inputs, 0..inputs.chain.joint_names().len()));
+        let widen = move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|name| widen_bounds(name)));
+        let hypothesis = Hypothesis::new(Code::JointZero, "all joints", change, ZERO, widen);
+        Hypothesis { mending, ..hypothesis }.estimating(Freedom::Number, far)
     })
+}
+
+/// The parameters that are the zeros of joints.
+pub fn zero_names(inputs: &Inputs) -> Vec<String> {
+    let joints = 0..inputs.chain.joint_names().len();
+    joints.filter_map(|j| inputs.chain.joint_zero(j)).map(|(p, _)| p.name.clone()).collect()
 }

@@ -19,7 +19,7 @@ use reader::{Reader, child, parse};
 pub(crate) use write::with_origins;
 pub use write::{roll_pitch_yaw_of, three_numbers};
 
-use super::{Chain, Source};
+use super::{ALONG, Chain, Source};
 use crate::rigid::Rigid;
 use crate::segment::{Body, Freedom, Geometry, Joint, Motion, Segment};
 use crate::tree::SegmentId;
@@ -29,9 +29,6 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-
-/// Component of a unit vector from which on it is one of the axes (2.5 deg).
-const ALONG: f64 = 0.999;
 
 /// What writing a joint back needs to know.
 #[derive(Debug, Clone, PartialEq)]
