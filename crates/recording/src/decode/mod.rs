@@ -8,9 +8,11 @@
 mod binary;
 mod cursor;
 mod error;
+mod inferred;
 mod joint_sink;
 mod json;
 mod msg;
+mod paths;
 mod pose_sink;
 mod protobuf;
 mod rows;
@@ -21,6 +23,8 @@ mod types;
 mod wire;
 
 pub use error::DecodeError;
+pub(crate) use inferred::InferredTypes;
+pub use paths::{has_list, parent_of};
 pub use rows::{JointRow, JointRows, PoseRow, PoseRows, Rows, ScalarRows};
 pub use shapes::Place;
 
@@ -84,6 +88,32 @@ pub fn fields_for(
         .map_or(Vec::new(), |(fields, ..)| fields)
 }
 
+/// Why the definition of a ROS type that is known as `known` cannot be used: it is in another language than that one, or
+/// unusable, or breaks off before the known one ends. None where it is that one, or another of its own.
+pub(crate) fn ros_problem(
+    name: &str,
+    [language, known_language]: [&str; 2],
+    data: &[u8],
+    known: &str,
+) -> Option<String> {
+    if language != known_language {
+        return Some(format!("it is in {language:?}, which is not read"));
+    }
+    match (msg::parse(data, name), msg::parse(known.as_bytes(), name)) {
+        (Err(why), _) => Some(why),
+        (Ok(own), Ok(whole)) => own.breaks_off(&whole).then(|| "it breaks off".to_owned()),
+        (Ok(_), Err(_)) => None,
+    }
+}
+
+/// Why a schema says nothing of JSON messages.
+pub(crate) fn json_problem(language: &str, data: &[u8]) -> Option<String> {
+    match language {
+        "jsonschema" => json::parse(data).err(),
+        _ => Some(format!("it is in {language:?}, which is not read")),
+    }
+}
+
 /// How to decode the messages of one channel; compiled once from its schema, shared by threads.
 #[derive(Debug)]
 pub struct Plan {
@@ -94,7 +124,8 @@ pub struct Plan {
     body: Option<Vec<u8>>,
     /// Whether all bodies of a message are read, each as a row.
     every_body: bool,
-    code: Code,
+    /// One, or one for each joint where each has a path of its own.
+    code: Vec<Code>,
 }
 
 #[derive(Debug)]
@@ -139,12 +170,13 @@ impl Plan {
             by_place: shape.by_place,
             body: body.map(|b| b.as_bytes().to_vec()),
             every_body: false,
-            code,
+            code: vec![code],
         })
     }
 
     /// Compiles the plan that reads `role` out of the fields at these paths, as `schema_data` defines them; the first is the
-    /// one that stamp and frame belong to. `[]` in a path marks a list, `*` at its end stands for all fields of a message.
+    /// one that stamp and frame belong to. `[]` in a path marks a list, `*` at its end stands for all fields of a message. Of
+    /// several positions each is one number, of a joint each: a message without one has NaN there.
     pub fn at(
         role: Role,
         schema_name: &str,
@@ -153,9 +185,16 @@ impl Plan {
         message_encoding: &str,
         (body, fields): (Option<&str>, &[(Place, &str)]),
     ) -> Result<Plan, DecodeError> {
-        let find = |schema: &str, types: &Types| Ok(((), shapes::locate_fields(schema, types, fields)?));
-        let ((), _, code) =
-            compile_schema([schema_name, schema_encoding, message_encoding], schema_data, find)?;
+        let source = [schema_name, schema_encoding, message_encoding];
+        let compile = |fields: &[(Place, &str)]| {
+            let find = |schema: &str, types: &Types| Ok(((), shapes::locate_fields(schema, types, fields)?));
+            compile_schema(source, schema_data, find).map(|((), _, code)| code)
+        };
+        let positions = fields.iter().filter(|(place, _)| *place == Place::Positions).count();
+        let code = match positions {
+            0 | 1 => vec![compile(fields)?],
+            _ => fields.iter().map(|field| compile(&[*field])).collect::<Result<_, _>>()?,
+        };
         let body = body.map(|b| b.as_bytes().to_vec());
         Ok(Plan { role, in_millimetres: false, by_place: true, body, every_body: false, code })
     }
@@ -163,8 +202,10 @@ impl Plan {
     /// The same plan, which refuses messages that do not end where their definition does: for definitions that did not
     /// come with the messages.
     pub fn exact(mut self) -> Plan {
-        if let Code::Binary(code) = &mut self.code {
-            code.go_to_the_end();
+        for code in &mut self.code {
+            if let Code::Binary(code) = code {
+                code.go_to_the_end();
+            }
         }
         self
     }
@@ -195,7 +236,13 @@ impl Plan {
             (Role::Joints, Rows::Joints(rows)) => {
                 let value = self.json_value(data)?;
                 let mut sink = joint_sink::JointSink::new(rows);
-                let decoded = self.run(data, &value, &mut sink);
+                let decoded = self.code.iter().try_for_each(|code| {
+                    code.run(data, &value, &mut sink)?;
+                    if self.code.len() > 1 {
+                        sink.end_joint();
+                    }
+                    Ok(())
+                });
                 sink.finish(decoded)
             }
             (Role::Pose, Rows::Pose(rows)) => {
@@ -233,9 +280,9 @@ impl Plan {
 
     /// The parsed text of a JSON message; null for the other encodings.
     fn json_value(&self, data: &[u8]) -> Result<serde_json::Value, DecodeError> {
-        match &self.code {
-            Code::Json(_) => json::parse_message(data),
-            Code::Binary(_) | Code::Protobuf(_) => Ok(serde_json::Value::Null),
+        match self.code.first() {
+            Some(Code::Json(_)) => json::parse_message(data),
+            _ => Ok(serde_json::Value::Null),
         }
     }
 
@@ -245,7 +292,18 @@ impl Plan {
         value: &'m serde_json::Value,
         sink: &mut S,
     ) -> Result<(), DecodeError> {
-        match &self.code {
+        self.code.iter().try_for_each(|code| code.run(data, value, sink))
+    }
+}
+
+impl Code {
+    fn run<'m, S: Sink<'m>>(
+        &self,
+        data: &'m [u8],
+        value: &'m serde_json::Value,
+        sink: &mut S,
+    ) -> Result<(), DecodeError> {
+        match self {
             Code::Binary(code) => code.run(data, sink),
             Code::Protobuf(code) => code.run(data, sink),
             Code::Json(code) => code.run(value, sink),
