@@ -70,7 +70,7 @@ pub fn readable_as(
     message_encoding: &str,
 ) -> Result<Role, DecodeError> {
     let source = [schema_name, schema_encoding, message_encoding];
-    let (shape, ..) = compile_schema(source, schema_data, shapes::recognise)?;
+    let (shape, ..) = compile_schema(source, schema_data, recognise)?;
     Ok(shape.role)
 }
 
@@ -83,7 +83,7 @@ pub fn fields_for(
     schema_data: &[u8],
     message_encoding: &str,
 ) -> Vec<String> {
-    let find = |_: &str, types: &Types| Ok((shapes::quantities_for(types, place), Wanted::default()));
+    let find = |_: &str, types: &Types| Ok((shapes::quantities_for(types, place), Vec::new()));
     compile_schema([schema_name, schema_encoding, message_encoding], schema_data, find)
         .map_or(Vec::new(), |(fields, ..)| fields)
 }
@@ -149,7 +149,8 @@ impl Plan {
         body: Option<&str>,
     ) -> Result<Plan, DecodeError> {
         let source = [schema_name, schema_encoding, message_encoding];
-        let (shape, wanted, code) = compile_schema(source, schema_data, shapes::recognise)?;
+        let (shape, wanted, code) = compile_schema(source, schema_data, recognise)?;
+        let has = |slot| wanted.iter().any(|wanted| wanted.has(slot));
         if shape.role != role {
             return Err(DecodeError::OtherRole {
                 schema: schema_name.to_owned(),
@@ -158,8 +159,8 @@ impl Plan {
             });
         }
         if let Some(body) = body
-            && !wanted.has(Slot::Body)
-            && !wanted.has(Slot::BodyIndex)
+            && !has(Slot::Body)
+            && !has(Slot::BodyIndex)
             && !shape.by_place
         {
             return Err(DecodeError::NoBodyName { schema: schema_name.to_owned(), body: body.to_owned() });
@@ -170,7 +171,7 @@ impl Plan {
             by_place: shape.by_place,
             body: body.map(|b| b.as_bytes().to_vec()),
             every_body: false,
-            code: vec![code],
+            code,
         })
     }
 
@@ -185,16 +186,14 @@ impl Plan {
         message_encoding: &str,
         (body, fields): (Option<&str>, &[(Place, &str)]),
     ) -> Result<Plan, DecodeError> {
-        let source = [schema_name, schema_encoding, message_encoding];
-        let compile = |fields: &[(Place, &str)]| {
-            let find = |schema: &str, types: &Types| Ok(((), shapes::locate_fields(schema, types, fields)?));
-            compile_schema(source, schema_data, find).map(|((), _, code)| code)
-        };
         let positions = fields.iter().filter(|(place, _)| *place == Place::Positions).count();
-        let code = match positions {
-            0 | 1 => vec![compile(fields)?],
-            _ => fields.iter().map(|field| compile(&[*field])).collect::<Result<_, _>>()?,
+        let find = |schema: &str, types: &Types| {
+            let locate = |fields| shapes::locate_fields(schema, types, fields);
+            let wanted = fields.chunks(if positions > 1 { 1 } else { fields.len().max(1) }).map(locate);
+            Ok(((), wanted.collect::<Result<Vec<Wanted>, _>>()?))
         };
+        let source = [schema_name, schema_encoding, message_encoding];
+        let ((), _, code) = compile_schema(source, schema_data, find)?;
         let body = body.map(|b| b.as_bytes().to_vec());
         Ok(Plan { role, in_millimetres: false, by_place: true, body, every_body: false, code })
     }
@@ -311,34 +310,40 @@ impl Code {
     }
 }
 
-/// What `find` makes of the message types of a schema, where its values are, and the code that reads them. The source is the
-/// schema's name and encoding and that of the messages.
+/// The shape that fits these types, and where its values are.
+fn recognise(schema: &str, types: &Types) -> Result<(&'static shapes::Shape, Vec<Wanted>), DecodeError> {
+    shapes::recognise(schema, types).map(|(shape, wanted)| (shape, vec![wanted]))
+}
+
+/// What `find` makes of the message types of a schema, where values are, and the code that reads each of these. The source is
+/// the schema's name and encoding and that of the messages.
 fn compile_schema<T>(
     [schema, schema_encoding, message_encoding]: [&str; 3],
     data: &[u8],
-    find: impl Fn(&str, &Types) -> Result<(T, Wanted), DecodeError>,
-) -> Result<(T, Wanted, Code), DecodeError> {
+    find: impl Fn(&str, &Types) -> Result<(T, Vec<Wanted>), DecodeError>,
+) -> Result<(T, Vec<Wanted>, Vec<Code>), DecodeError> {
     let unusable = |why: String| DecodeError::Schema { schema: schema.to_owned(), why };
     let binary = |encoding: Encoding| {
         let types = msg::parse(data, schema).map_err(unusable)?;
-        let (shape, wanted) = find(schema, &types)?;
-        let code = binary::Code::compile(&types, &wanted, encoding).map_err(unusable)?;
-        Ok((shape, wanted, Code::Binary(code)))
+        let (found, wanted) = find(schema, &types)?;
+        let compile = |wanted| binary::Code::compile(&types, wanted, encoding).map(Code::Binary);
+        let code = wanted.iter().map(compile).collect::<Result<_, _>>().map_err(unusable)?;
+        Ok((found, wanted, code))
     };
     match (schema_encoding, message_encoding) {
         ("ros2msg", "cdr") => binary(Encoding::Cdr),
         ("ros1msg", "ros1") => binary(Encoding::Ros1),
         ("protobuf", "protobuf") => {
             let descriptors = protobuf::Schema::read(schema, data).map_err(unusable)?;
-            let (shape, wanted) = find(schema, &descriptors.types)?;
-            let code = descriptors.compile(&wanted);
-            Ok((shape, wanted, Code::Protobuf(code)))
+            let (found, wanted) = find(schema, &descriptors.types)?;
+            let code = wanted.iter().map(|wanted| Code::Protobuf(descriptors.compile(wanted))).collect();
+            Ok((found, wanted, code))
         }
         ("jsonschema", "json") => {
             let types = json::parse(data).map_err(unusable)?;
-            let (shape, wanted) = find(schema, &types)?;
-            let code = json::Code::compile(&types, &wanted);
-            Ok((shape, wanted, Code::Json(code)))
+            let (found, wanted) = find(schema, &types)?;
+            let code = wanted.iter().map(|wanted| Code::Json(json::Code::compile(&types, wanted))).collect();
+            Ok((found, wanted, code))
         }
         _ => Err(DecodeError::Encoding {
             schema: schema_encoding.to_owned(),
