@@ -157,8 +157,12 @@ pub fn find(
 /// The other fields that the joints may be in.
 fn other_fields_note(own: &JointTopic, channels: &Channels) -> Option<String> {
     let Field { values, why, .. } = own.field.as_ref()?;
+    // The same fields in another order are no others.
+    let places = |j: &JointTopic| -> BTreeSet<String> {
+        j.field.iter().flat_map(|f| &f.positions).map(|path| format!("{}:{path}", j.topic)).collect()
+    };
     let as_many =
-        |j: &&JointTopic| j.field.as_ref().is_some_and(|f| f.values == *values) && j.shown() != own.shown();
+        |j: &&JointTopic| j.field.as_ref().is_some_and(|f| f.values == *values) && places(j) != places(own);
     let others: Vec<String> = channels.joints.iter().filter(as_many).map(JointTopic::shown).collect();
     let said = format!(
         "the joints are at {}: {why}; --joints chooses another of {}",
@@ -336,6 +340,12 @@ fn topic_of(told: &Told, channels: &Channels, joints: &[String]) -> Option<(Join
     let most = |j: &&JointTopic| j.field.is_none().then(|| (Reverse(j.messages), j.topic.clone()));
     let found = candidate_topics(told, channels).filter(has_all).min_by_key(most);
     let found = found.or_else(|| candidate_topics(told, channels).find(unnamed));
+    // A list without names may go on with the gripper, which the model has not.
+    let longer = |j: &&JointTopic| {
+        let values = j.field.as_ref().filter(|f| f.positions.len() == 1).map_or(0, |f| f.values);
+        j.names.is_empty() && (1..=GRIPPER_JOINTS).contains(&values.saturating_sub(joints.len()))
+    };
+    let found = found.or_else(|| candidate_topics(told, channels).find(longer));
     found.map(|j| (j.of_joints(joints), joints.to_vec()))
 }
 
@@ -433,8 +443,13 @@ fn from_urdf(
         unsure.push(left_out_note(&source, &joints, end, &model_joints));
     }
     if unnamed {
-        let said = format!("{} names no joints: they are read in the order of the model", source.shown());
-        unsure.push(said);
+        let more = source.field.as_ref().map_or(0, |f| f.values.saturating_sub(names.len()));
+        let more = match more {
+            0 => String::new(),
+            more => format!(", and the last {more} of them are taken for a gripper's and left out"),
+        };
+        let shown = source.shown();
+        unsure.push(format!("{shown} names no joints: they are read in the order of the model{more}"));
     }
     let base_link = Some(base_link);
     drop(document);
@@ -633,6 +648,9 @@ mod tests {
         let whole = find(5, None).unwrap();
         assert_eq!((whole.names.len(), whole.unsure.len()), (5, 1));
         assert_eq!(find(4, Some("tool")).unwrap().unsure.len(), 1);
+        let longer = find(7, None).unwrap();
+        assert!(longer.names.len() == 5 && longer.unsure[0].contains("the last 2 of them"));
+        assert!(find(8, None).is_err());
         // So many are no gripper.
         let refused = find(2, None).err().unwrap().to_string();
         assert!(refused.contains("a, b, c, d, grip") && refused.contains("has 2 numbers"), "{refused}");

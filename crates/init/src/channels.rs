@@ -222,12 +222,12 @@ impl Found {
 impl Channels {
     fn sort(&mut self, topic: String, found: Found, recordings: usize) {
         let Found { names, messages, .. } = found;
-        self.unread |= messages > 0
-            && match found.role {
-                Some(Role::Joints) => found.recordings < recordings,
-                Some(_) => false,
-                None => !found.describes && found.why_not.as_ref().is_some_and(|refused| refused.unread),
-            };
+        // Messages that nobody can read were not counted.
+        self.unread |= match found.role {
+            Some(Role::Joints) => messages > 0 && found.recordings < recordings,
+            Some(_) => false,
+            None => !found.describes && found.why_not.as_ref().is_some_and(|refused| refused.unread),
+        };
         let mut leave = |why: String| self.left.push((topic.clone(), why));
         match found.role {
             _ if messages == 0 && found.role.is_some() => leave("no message".to_owned()),

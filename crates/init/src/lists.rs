@@ -114,6 +114,13 @@ impl List {
         let possible = |(.., values): &Row| values.iter().all(|x| x.abs() <= LARGEST);
         self.rows.iter().all(possible)
             && (0..self.values()).map(|k| self.range(k)).any(|(low, high)| high - low > MOVES)
+            && !(0..self.values()).any(|k| self.is_clock(k))
+    }
+
+    /// Whether a column grows from each message to the next, as no joint does that comes back or pauses.
+    fn is_clock(&self, column: usize) -> bool {
+        let mut pairs = self.pairs().peekable();
+        pairs.peek().is_some() && pairs.all(|i| self.rows[i + 1].2[column] > self.rows[i].2[column])
     }
 
     /// Messages that follow each other: where the first is.
@@ -167,5 +174,20 @@ impl List {
             if high > low { jumps.sum::<f64>() / (high - low) } else { 0.0 }
         };
         (0..self.values()).map(of).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_is_no_joint() {
+        let list = |column: fn(f64) -> f64| {
+            let row = |i: u64| ((1, i), 0, vec![(0.1 * i as f64).sin(), column(i as f64)]);
+            List { paths: vec!["*".into()], rows: (0..50).map(row).collect(), ..List::default() }
+        };
+        assert_eq!(ranked(&[list(|i| (0.3 * i).cos())], "/q", 50).len(), 1);
+        assert!(ranked(&[list(|i| 0.01 * i)], "/q", 50).is_empty());
     }
 }
