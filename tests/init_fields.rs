@@ -232,3 +232,74 @@ fn bodies_on_different_frames_of_a_tree_are_joined_over_the_transforms_between()
     println!("{errors:?} mm");
     assert!((errors[0] - errors[1]).abs() < 1e-3 * errors[1], "{errors:?}");
 }
+
+/// The paper's upright recording as a script logs it: the joints as JSON without a schema, a field for each in another order than the
+/// model's, and the tracked bodies with a definition that breaks off.
+fn as_a_script_logs(out: &Path) {
+    let joints = ros2::JOINT_STATE;
+    let plan = Plan::compile(Role::Joints, joints.name, "ros2msg", joints.text.as_bytes(), "cdr", None)
+        .expect("known");
+    let bytes = std::fs::read(root().join("fixtures/paper/normal.mcap")).expect("recording");
+    let mut out = McapOutput::create(out, "").expect("a recording");
+    let (nothing, mut before) = (BTreeMap::new(), [0.0; 3]);
+    for message in mcap::MessageStream::new(&bytes).expect("MCAP") {
+        let message = message.expect("a message");
+        let schema = message.channel.schema.as_ref().expect("a schema");
+        let mut put = |schema: Option<(&str, &str, &[u8])>, encoding: &str, data: &[u8]| {
+            let id = out.add_channel(&message.channel.topic, schema, encoding, &nothing).expect("a channel");
+            out.put(id, message.sequence, message.log_time, message.publish_time, data).expect("written");
+        };
+        if message.channel.topic != "/joint_states" {
+            let end = schema.data.iter().position(|b| *b == b'=').unwrap_or(schema.data.len());
+            put(Some((&schema.name, &schema.encoding, &schema.data[..end])), "cdr", &message.data);
+            continue;
+        }
+        let mut rows = Rows::new(Role::Joints);
+        plan.decode(&message.data, &mut rows).expect("a message");
+        let Rows::Joints(rows) = &rows else { panic!("joints") };
+        let (row, stamp_ns) = (rows.row(0), rows.stamp_ns[0].expect("a stamp"));
+        let of = |joint: usize| {
+            row.position[row.names.iter().position(|n| *n == format!("joint{joint}")).expect("a joint")]
+        };
+        let now = [of(1), of(2), of(3)];
+        let each = [2, 3, 1].map(|joint: usize| {
+            let (q, speed) = (now[joint - 1], (now[joint - 1] - before[joint - 1]) / 0.02);
+            format!(r#""joint{joint}.vel":{speed},"joint{joint}.pos":{q}"#)
+        });
+        before = now;
+        let (sec, nsec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
+        let json =
+            format!(r#"{{"timestamp":{{"sec":{sec},"nsec":{nsec}}},"load":{},{}}}"#, sec % 7, each.join(","));
+        put(None, "json", json.as_bytes());
+    }
+    out.finish().expect("finished");
+}
+
+#[test]
+fn a_field_for_each_joint_and_messages_without_a_definition_are_found() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let recording = folder.path().join("script.mcap");
+    as_a_script_logs(&recording);
+    let [dh, board] =
+        ["models/right_arm.toml", "boards/paper.toml"].map(|p| root().join("pipelines").join(p));
+    let mut errors = Vec::new();
+    for (name, recording) in [("script", recording), ("plain", root().join("fixtures/paper/normal.mcap"))] {
+        let pipeline = folder.path().join(format!("{name}.toml"));
+        let mut arguments =
+            vec![Path::new("init"), &recording, Path::new("--dh"), &dh, Path::new("--board"), &board];
+        arguments.extend([Path::new("--out"), &pipeline]);
+        let output = armcal(arguments);
+        let said = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat();
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        if name == "script" {
+            println!("{said}");
+            let text = std::fs::read_to_string(&pipeline).expect("a proposal");
+            let line = r#"position = ["'joint1.pos'", "'joint2.pos'", "'joint3.pos'"]"#;
+            assert!(text.contains(line) && said.contains("read by the fields"), "{text}\n{said}");
+        }
+        let summary = run_pipeline(&pipeline, &folder.path().join(name), &[0, 3]);
+        errors.push(number(&summary, "/fit/holdout/fitted_mm/mean"));
+    }
+    println!("{errors:?} mm");
+    assert!((errors[0] - errors[1]).abs() < 1e-3 * errors[1], "{errors:?}");
+}

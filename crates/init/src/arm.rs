@@ -1,6 +1,7 @@
 //! The nominal arm: which of its joints are recorded, from which link to which.
 
-use super::channels::Channels;
+use super::channels::{Channels, Unknown};
+use super::missing::no_joints;
 use super::topics::{Field, JointTopic};
 use crate::error::InitError;
 use armcal_core::Pose;
@@ -14,6 +15,9 @@ use std::path::{Path, PathBuf};
 
 /// Names that REP-105 keeps for what is no part of a robot.
 const NO_ROBOT: [&str; 4] = ["world", "map", "odom", "earth"];
+
+/// A gripper has no more joints in a row.
+const GRIPPER_JOINTS: usize = 2;
 
 /// What the user says of the arm.
 #[derive(Debug, Clone, Default)]
@@ -103,6 +107,16 @@ pub fn find(
     folders: &BTreeSet<PathBuf>,
     beside: &Path,
 ) -> Result<Arm, InitError> {
+    let found = channels;
+    let (own_joints, links) = joints_and_links(told, channels, folders, beside);
+    let mut joints = channels.joints.clone();
+    let called = |of: &Unknown| of.fields.called(&own_joints, &of.topic, of.messages);
+    joints.extend(channels.unknown.iter().flat_map(called));
+    joints.sort_by_key(|j| j.field.as_ref().map(|f| Reverse(f.surety)));
+    if joints.is_empty() {
+        return Err(no_joints(found, &own_joints, &links));
+    }
+    let channels = &Channels { joints, urdfs: channels.urdfs.clone(), ..Channels::default() };
     if let Some(asked) = &told.joints
         && !channels.joints.iter().any(|j| is_called(j, asked))
     {
@@ -117,11 +131,13 @@ pub fn find(
         let field = j.field.clone().map(|f| Field { name: None, ..f });
         JointTopic { names: Vec::new(), field, ..j.clone() }
     };
+    // Fields that were found by the names of joints have no order of their own.
+    let in_order = |j: &JointTopic| j.field.as_ref().is_some_and(|f| f.name.is_some() || j.names.is_empty());
     let all = || channels.joints.iter();
     let ways: [Vec<JointTopic>; 3] = [
         all().filter(|j| j.field.is_none()).cloned().collect(),
         all().filter(|j| j.field.is_some() && !j.names.is_empty()).cloned().collect(),
-        all().filter(|j| j.field.is_some()).map(unnamed).collect(),
+        all().filter(|j| in_order(j)).map(unnamed).collect(),
     ];
     let mut refused = None;
     for joints in ways.into_iter().filter(|way| !way.is_empty()) {
@@ -129,19 +145,24 @@ pub fn find(
         match resolve_arm(told, &way, folders, beside) {
             Ok(mut arm) => {
                 arm.unsure.extend(other_fields_note(&arm.source, channels));
+                arm.unsure.extend(found.substituted.iter().cloned());
                 return Ok(arm);
             }
             Err(error) => _ = refused.get_or_insert(error),
         }
     }
-    Err(refused.unwrap_or_else(|| no_arm(channels, "no joint is recorded")))
+    Err(refused.unwrap_or_else(|| no_joints(found, &own_joints, &links)))
 }
 
 /// The other fields that the joints may be in.
 fn other_fields_note(own: &JointTopic, channels: &Channels) -> Option<String> {
     let Field { values, why, .. } = own.field.as_ref()?;
+    // The same fields in another order are no others.
+    let places = |j: &JointTopic| -> BTreeSet<String> {
+        j.field.iter().flat_map(|f| &f.positions).map(|path| format!("{}:{path}", j.topic)).collect()
+    };
     let as_many =
-        |j: &&JointTopic| j.field.as_ref().is_some_and(|f| f.values == *values) && j.shown() != own.shown();
+        |j: &&JointTopic| j.field.as_ref().is_some_and(|f| f.values == *values) && places(j) != places(own);
     let others: Vec<String> = channels.joints.iter().filter(as_many).map(JointTopic::shown).collect();
     let said = format!(
         "the joints are at {}: {why}; --joints chooses another of {}",
@@ -173,8 +194,19 @@ fn resolve_arm(
     if let Some(path) = &told.dh {
         return from_dh(told, channels, path);
     }
+    let (file, text, recorded) = urdf_of(told, channels, folders, beside)?;
+    from_urdf(told, channels, file, text, recorded)
+}
+
+/// File and text of the URDF, and whether it was recorded.
+fn urdf_of(
+    told: &Told,
+    channels: &Channels,
+    folders: &BTreeSet<PathBuf>,
+    beside: &Path,
+) -> Result<(PathBuf, String, bool), InitError> {
     let read = |path: &Path| armcal_config::read_text("URDF", Kind::Text, path);
-    let (file, text, recorded) = match (&told.urdf, channels.urdfs.len()) {
+    Ok(match (&told.urdf, channels.urdfs.len()) {
         (Some(path), _) => (path.clone(), read(path)?, false),
         (None, 1) => (beside.to_owned(), channels.urdfs.iter().next().cloned().unwrap_or_default(), true),
         (None, 0) => match urdfs_in(folders).as_slice() {
@@ -192,8 +224,26 @@ fn resolve_arm(
                 &format!("{n} different robot descriptions are recorded; write the right one to a file"),
             ));
         }
-    };
-    from_urdf(told, channels, file, text, recorded)
+    })
+}
+
+/// The joints of the model and the links that they move, as far as it can be read.
+fn joints_and_links(
+    told: &Told,
+    channels: &Channels,
+    folders: &BTreeSet<PathBuf>,
+    beside: &Path,
+) -> (Vec<String>, Vec<String>) {
+    if let Some(path) = &told.dh {
+        let text = armcal_config::read_text("DH model", Kind::Text, path).unwrap_or_default();
+        let rows = Chain::from_dh_toml(&text, path).map(|chain| chain.joint_names().to_vec());
+        return (rows.unwrap_or_default(), Vec::new());
+    }
+    let text = urdf_of(told, channels, folders, beside).map(|(_, text, _)| text).unwrap_or_default();
+    let document = check_xml(&text).ok().and_then(|()| Document::parse(&text).ok());
+    let joints = document.as_ref().map(|document| joints_of(document.root_element())).unwrap_or_default();
+    let moving = joints.into_iter().filter(|(_, l)| l.moves);
+    moving.map(|(link, l)| (l.joint.to_owned(), link.to_owned())).unzip()
 }
 
 fn no_arm(channels: &Channels, why: &str) -> InitError {
@@ -234,7 +284,7 @@ fn from_dh(told: &Told, channels: &Channels, path: &Path) -> Result<Arm, InitErr
                 rows.join(", "),
                 only.names.join(", ")
             ));
-            (only.clone(), only.names.clone())
+            (only.of_joints(&only.names), only.names.clone())
         }
     };
     unsure.extend(other_topic_notes(told, channels, &source.topic, &names));
@@ -289,7 +339,14 @@ fn topic_of(told: &Told, channels: &Channels, joints: &[String]) -> Option<(Join
     // Of fields the first: they are in the order of what speaks for them.
     let most = |j: &&JointTopic| j.field.is_none().then(|| (Reverse(j.messages), j.topic.clone()));
     let found = candidate_topics(told, channels).filter(has_all).min_by_key(most);
-    found.or_else(|| candidate_topics(told, channels).find(unnamed)).map(|j| (j.clone(), joints.to_vec()))
+    let found = found.or_else(|| candidate_topics(told, channels).find(unnamed));
+    // A list without names may go on with the gripper, which the model has not.
+    let longer = |j: &&JointTopic| {
+        let values = j.field.as_ref().filter(|f| f.positions.len() == 1).map_or(0, |f| f.values);
+        j.names.is_empty() && (1..=GRIPPER_JOINTS).contains(&values.saturating_sub(joints.len()))
+    };
+    let found = found.or_else(|| candidate_topics(told, channels).find(longer));
+    found.map(|j| (j.of_joints(joints), joints.to_vec()))
 }
 
 /// A joint of a URDF.
@@ -324,7 +381,8 @@ fn from_urdf(
     let depths = joint_depths(&joints, counts);
     let depth = |link: &&str| depths[link];
     let ends: Vec<&str> = joints.iter().filter(|(_, l)| counts(l)).map(|(child, _)| *child).collect();
-    let deepest = ends.iter().map(&depth).max().unwrap_or(0);
+    let whole = ends.iter().map(&depth).max().unwrap_or(0);
+    let deepest = if unnamed { depth_of_numbers(told, channels, whole) } else { whole };
     let end = match &told.tip_link {
         Some(tip) => {
             let known = joints.get_key_value(tip.as_str()).map(|(link, _)| *link);
@@ -381,13 +439,48 @@ fn from_urdf(
     links.extend(joints.values().map(|l| l.parent.to_owned()));
     let carried = moving.iter().map(|link| (*link).to_owned()).collect();
     let mut unsure = other_topic_notes(told, channels, &source.topic, &names);
+    if deepest < whole && told.tip_link.is_none() {
+        unsure.push(left_out_note(&source, &joints, end, &model_joints));
+    }
     if unnamed {
-        let said = format!("{} names no joints: they are read in the order of the model", source.shown());
-        unsure.push(said);
+        let more = source.field.as_ref().map_or(0, |f| f.values.saturating_sub(names.len()));
+        let more = match more {
+            0 => String::new(),
+            more => format!(", and the last {more} of them are taken for a gripper's and left out"),
+        };
+        let shown = source.shown();
+        unsure.push(format!("{shown} names no joints: they are read in the order of the model{more}"));
     }
     let base_link = Some(base_link);
     drop(document);
     Ok(Arm { file, recorded, base_link, tips, source, names, links, model, carried, unsure, text })
+}
+
+/// So many joints in a row as there are numbers where these come without names: all of them, or one or two less, of a gripper
+/// that is not recorded.
+fn depth_of_numbers(told: &Told, channels: &Channels, whole: usize) -> usize {
+    let numbers = |j: &JointTopic| j.field.as_ref().map_or(whole, |f| f.values);
+    let known: Vec<usize> = candidate_topics(told, channels).map(numbers).collect();
+    let fits = |n: &usize| *n > 0 && (1..=GRIPPER_JOINTS).contains(&whole.saturating_sub(*n));
+    if known.contains(&whole) { whole } else { known.into_iter().find(fits).unwrap_or(whole) }
+}
+
+/// What of the URDF is taken for not recorded, and why.
+fn left_out_note(
+    source: &JointTopic,
+    joints: &BTreeMap<&str, Link<'_>>,
+    end: &str,
+    read: &[String],
+) -> String {
+    let behind = joints.iter().filter(|(link, l)| l.moves && link_path(joints, link).contains(&end));
+    let behind = behind.map(|(_, l)| l.joint).filter(|joint| !read.iter().any(|read| read == joint));
+    let behind = behind.collect::<Vec<_>>().join(", ");
+    format!(
+        "{} has {} numbers: taken for {}; {behind} behind {end} is left out as not recorded, and --tip-link LINK chooses otherwise",
+        source.shown(),
+        read.len(),
+        read.join(", ")
+    )
 }
 
 /// Every joint by the link that it carries.
@@ -481,6 +574,14 @@ mod tests {
         )
     }
 
+    /// A list of so many numbers without names.
+    fn numbers(values: usize) -> Channels {
+        let field =
+            Field { positions: vec!["data[]".into()], name: None, values, surety: 2, why: String::new() };
+        let topic = JointTopic { topic: "/q".into(), names: Vec::new(), messages: 1, field: Some(field) };
+        Channels { joints: vec![topic], ..Channels::default() }
+    }
+
     fn recorded(names: &[&str]) -> Channels {
         let names = names.iter().map(|n| (*n).to_owned()).collect();
         Channels {
@@ -524,5 +625,48 @@ mod tests {
         assert!(refused.contains("l1, r1") && refused.contains("--tip-link"), "{refused}");
         let told = Told { tip_link: Some("r1".into()), ..Told::default() };
         assert_eq!(find(&told).unwrap().names, ["b"]);
+    }
+
+    /// Five joints and a gripper on the last link.
+    #[test]
+    fn fewer_numbers_than_joints_leave_the_gripper_out() {
+        let arm = [
+            ("a", "revolute", "base", "l1"),
+            ("b", "revolute", "l1", "l2"),
+            ("c", "revolute", "l2", "l3"),
+            ("d", "revolute", "l3", "l4"),
+            ("grip", "revolute", "l4", "jaw"),
+            ("frame", "fixed", "l4", "tool"),
+        ];
+        let find = |values, tip: Option<&str>| {
+            let told = Told { tip_link: tip.map(str::to_owned), ..Told::default() };
+            from_urdf(&told, &numbers(values), "r.urdf".into(), urdf(&arm), false)
+        };
+        let shorter = find(4, None).unwrap();
+        assert_eq!((shorter.names.join(" "), shorter.tips.join(" ")), ("a b c d".into(), "tool l4".into()));
+        assert!(shorter.unsure.iter().any(|said| said.contains("grip behind l4 is left out")));
+        let whole = find(5, None).unwrap();
+        assert_eq!((whole.names.len(), whole.unsure.len()), (5, 1));
+        assert_eq!(find(4, Some("tool")).unwrap().unsure.len(), 1);
+        let longer = find(7, None).unwrap();
+        assert!(longer.names.len() == 5 && longer.unsure[0].contains("the last 2 of them"));
+        assert!(find(8, None).is_err());
+        // So many are no gripper.
+        let refused = find(2, None).err().unwrap().to_string();
+        assert!(refused.contains("a, b, c, d, grip") && refused.contains("has 2 numbers"), "{refused}");
+    }
+
+    #[test]
+    fn fields_that_are_called_as_joints_come_in_the_order_of_the_model() {
+        let joints = |names: [&str; 3]| {
+            let paths = names.iter().map(|name| format!("{name}.pos")).collect();
+            let field = Field { positions: paths, name: None, values: 3, surety: 2, why: String::new() };
+            let names = names.iter().map(|n| (*n).to_owned()).collect();
+            JointTopic { topic: "/q".into(), names, messages: 1, field: Some(field) }
+        };
+        let channels = Channels { joints: vec![joints(["b", "lift", "a"])], ..Channels::default() };
+        let found = from_urdf(&Told::default(), &channels, "r.urdf".into(), urdf(&ARM), false).unwrap();
+        assert_eq!(found.names, ["lift", "a", "b"]);
+        assert_eq!(found.source.field.unwrap().positions, ["lift.pos", "a.pos", "b.pos"]);
     }
 }

@@ -4,7 +4,8 @@ use super::fields::Fields;
 use super::files::Opened;
 use super::topics::{BodyTopic, JointTopic};
 use crate::error::InitError;
-use armcal_recording::decode::{Plan, Role, Rows, readable_as};
+use armcal_core::Code;
+use armcal_recording::decode::{DecodeError, Plan, Role, Rows, readable_as};
 use armcal_recording::{RawChannel, RawSchema, RecordingError, inflate_message};
 use armcal_stages::RunError;
 use std::cmp::Reverse;
@@ -20,7 +21,7 @@ const MOST_NAMES: usize = 64;
 const MOST_TYPES: usize = 1000;
 
 /// What all the recordings have in common, and what is left over.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Channels {
     /// Joint readings.
     pub joints: Vec<JointTopic>,
@@ -34,6 +35,22 @@ pub struct Channels {
     pub urdfs: BTreeSet<String>,
     /// What is not used, and why.
     pub left: Vec<(String, String)>,
+    /// Messages of unknown types in every recording, in which fields may be called as the joints are.
+    pub unknown: Vec<Unknown>,
+    /// Whether a topic may hold joints for all that is known: its messages cannot be read, or not in every recording.
+    pub unread: bool,
+    /// What is read by another definition than the file's.
+    pub substituted: BTreeSet<String>,
+}
+
+/// Messages of a type that armcal does not know.
+pub struct Unknown {
+    /// Their topic.
+    pub topic: String,
+    /// Messages in all recordings.
+    pub messages: u64,
+    /// What they hold.
+    pub fields: Fields,
 }
 
 /// What one topic holds.
@@ -45,7 +62,15 @@ struct Found {
     thermometer: bool,
     describes: bool,
     names: Vec<String>,
-    why_not: String,
+    why_not: Option<Refused>,
+}
+
+/// Why messages are of no role.
+#[derive(Debug, Clone)]
+struct Refused {
+    why: String,
+    /// Whether nobody knows what they hold.
+    unread: bool,
 }
 
 /// Looks into every recording.
@@ -58,14 +83,18 @@ pub fn scan_recordings(opened: &[Opened]) -> Result<Channels, InitError> {
         let mut plans = Plans::default();
         for channel in recording.channels() {
             let topic = own.entry(channel.topic.clone()).or_default();
-            let Some(schema) = &channel.schema else { continue };
+            let Some(schema) = channel.definition() else {
+                let why = format!("its messages ({}) come without a schema", channel.message_encoding);
+                topic.why_not = Some(Refused { why, unread: true });
+                continue;
+            };
             match plans.add(schema, &channel) {
                 Ok(role) => {
                     topic.role = topic.role.or(Some(role));
                     topic.thermometer |= role == Role::Scalar && is_thermometer(&channel);
                 }
                 Err(why) => {
-                    topic.why_not = why;
+                    topic.why_not = Some(why);
                     if let Some(known) = fields.get_mut(&channel.topic) {
                         known.next_recording();
                     } else if fields.len() < MOST_TYPES {
@@ -104,7 +133,12 @@ pub fn scan_recordings(opened: &[Opened]) -> Result<Channels, InitError> {
             })
             .and_then(|()| recording.within(&allowance))
             // What the pass found to be lost is noted, whatever becomes of the proposal.
-            .and_then(|()| recording.whole_report().map(drop))
+            .and_then(|()| {
+                let said = recording.whole_report()?.warnings.iter();
+                let said = said.filter(|w| w.code == Code::DefinitionSubstituted);
+                channels.substituted.extend(said.map(|w| w.message.clone()));
+                Ok(())
+            })
             .map_err(|source: RecordingError| RunError::Recording { recording: entry.name(), source })?;
         for (topic, own) in own {
             let all = found.entry(topic).or_default();
@@ -120,10 +154,11 @@ pub fn scan_recordings(opened: &[Opened]) -> Result<Channels, InitError> {
     }
     for (topic, found) in found {
         let all = found.recordings == opened.len() && found.role.is_none();
-        if let Some(fields) = fields.get(&topic).filter(|_| all) {
+        if let Some(fields) = fields.remove(&topic).filter(|_| all) {
             channels.joints.extend(fields.joints(&topic, found.messages));
             channels.bodies.extend(fields.bodies(&topic));
             channels.warm.extend(fields.thermometers.iter().map(|path| (topic.clone(), path.clone())));
+            channels.unknown.push(Unknown { topic: topic.clone(), messages: found.messages, fields });
         }
         channels.sort(topic, found, opened.len());
     }
@@ -137,7 +172,7 @@ pub fn scan_recordings(opened: &[Opened]) -> Result<Channels, InitError> {
 struct Plans {
     plans: Vec<Plan>,
     /// Place of the plan of a schema with a message encoding, or why there is none.
-    schemas: HashMap<(Arc<RawSchema>, Arc<str>), Result<usize, String>>,
+    schemas: HashMap<(Arc<RawSchema>, Arc<str>), Result<usize, Refused>>,
     channels: HashMap<Arc<RawChannel>, usize>,
 }
 
@@ -146,17 +181,22 @@ impl Plans {
     ///
     /// # Errors
     /// Why it has none.
-    fn add(&mut self, schema: &Arc<RawSchema>, channel: &Arc<RawChannel>) -> Result<Role, String> {
+    fn add(&mut self, schema: &Arc<RawSchema>, channel: &Arc<RawChannel>) -> Result<Role, Refused> {
         let encoding = &channel.message_encoding;
         let plans = &mut self.plans;
         let compile = || {
             let (name, language, data) = (&schema.name, &schema.encoding, &schema.data);
-            let role = readable_as(name, language, data, encoding).map_err(|e| e.to_string())?;
+            let refused = |error: DecodeError| {
+                let unread = !matches!(error, DecodeError::Unknown { .. });
+                Refused { why: error.to_string(), unread }
+            };
+            let role = readable_as(name, language, data, encoding).map_err(refused)?;
             if plans.len() == MOST_TYPES {
-                return Err(format!("one of more than {MOST_TYPES} types of messages that could be read"));
+                let why = format!("one of more than {MOST_TYPES} types of messages that could be read");
+                return Err(Refused { why, unread: true });
             }
             let plan = Plan::compile(role, name, language, data, encoding, None);
-            plans.push(plan.map_err(|e| e.to_string())?);
+            plans.push(plan.map_err(refused)?);
             Ok(plans.len() - 1)
         };
         let place = self.schemas.entry((schema.clone(), encoding.clone())).or_insert_with(compile).clone()?;
@@ -182,13 +222,23 @@ impl Found {
 impl Channels {
     fn sort(&mut self, topic: String, found: Found, recordings: usize) {
         let Found { names, messages, .. } = found;
+        // Messages that nobody can read were not counted.
+        self.unread |= match found.role {
+            Some(Role::Joints) => messages > 0 && found.recordings < recordings,
+            Some(_) => false,
+            None => !found.describes && found.why_not.as_ref().is_some_and(|refused| refused.unread),
+        };
         let mut leave = |why: String| self.left.push((topic.clone(), why));
         match found.role {
             _ if messages == 0 && found.role.is_some() => leave("no message".to_owned()),
             // What it describes is told with the arm.
             None if found.describes => {}
-            None if found.why_not.is_empty() => leave("not of a kind that a calibration reads".to_owned()),
-            None => leave(found.why_not),
+            None => {
+                leave(found.why_not.map_or_else(
+                    || "not of a kind that a calibration reads".to_owned(),
+                    |refused| refused.why,
+                ))
+            }
             Some(_) if found.recordings < recordings => {
                 leave(format!("only in {} of {recordings} recordings", found.recordings));
             }

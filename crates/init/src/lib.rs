@@ -16,6 +16,8 @@ mod fields;
 mod files;
 mod frames;
 mod known;
+mod lists;
+mod missing;
 mod motion;
 mod page;
 mod points;
@@ -23,6 +25,7 @@ mod proposal;
 mod read;
 mod roles;
 mod seats;
+mod singles;
 mod sockets;
 mod topics;
 
@@ -40,7 +43,6 @@ use armcal_stages::associated::Associated;
 use armcal_stages::preprocess;
 use armcal_stages::{Inputs, Silent, Steps};
 use armcal_table::Board;
-use channels::Channels;
 use known::Known;
 use std::path::{Path, PathBuf};
 
@@ -133,9 +135,6 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
         let why = "--points says where the tip was, in the frame of another sensor";
         channels.left.extend(seen.iter().map(|body| (body.shown(), why.to_owned())));
     }
-    if channels.joints.is_empty() {
-        return Err(no_joints(&channels));
-    }
     let paths = opened.iter().flat_map(|o| &o.entry.paths);
     let folders = paths.filter_map(|p| p.parent()).map(Path::to_owned).collect();
     let arm = arm::find(&asked.told, &channels, &folders, &asked.out.with_extension("urdf"))?;
@@ -197,22 +196,6 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
 
 fn read_board(path: &Path) -> Result<Board, InitError> {
     Ok(Board::from_toml(&armcal_config::read_text("board", Kind::Text, path)?, path)?)
-}
-
-fn no_joints(channels: &Channels) -> InitError {
-    let left = channels.left.iter().map(|(topic, why)| format!("{topic} ({why})"));
-    let bodies = channels.bodies.iter().map(|b| format!("{} (a tracked body)", b.shown()));
-    let warm = channels.temperatures.iter().map(|t| format!("{t} (a thermometer)"));
-    let seen: Vec<String> = bodies.chain(warm).chain(left).collect();
-    let problem = match seen.is_empty() {
-        true => "nothing is recorded: there is no channel at all. `armcal inspect` shows what a file holds"
-            .to_owned(),
-        false => format!(
-            "no topic has joint readings in every recording: {}; record the topic of the joints too (ros2 bag record /joint_states ..)",
-            seen.join("; ")
-        ),
-    };
-    InitError::Init { problem }
 }
 
 fn nothing_seen(arm: &arm::Arm, read: &read::AllRead, cast: &[Cast]) -> InitError {

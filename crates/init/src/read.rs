@@ -107,7 +107,7 @@ pub fn read_recordings(
         joints: vec![JointStream {
             topic: arm.source.topic.clone(),
             names: arm.names.clone(),
-            position: field.map(|f| f.position.clone()),
+            position: field.map_or(Vec::new(), |f| f.positions.clone()),
             name: field.and_then(|f| f.name.clone()),
             ..JointStream::default()
         }],

@@ -16,7 +16,21 @@ pub struct JointTopic {
 impl JointTopic {
     /// What `--joints` calls it.
     pub fn shown(&self) -> String {
-        self.field.as_ref().map_or_else(|| self.topic.clone(), |f| format!("{}:{}", self.topic, f.position))
+        let shown = |f: &Field| format!("{}:{}", self.topic, f.positions.join(","));
+        self.field.as_ref().map_or_else(|| self.topic.clone(), shown)
+    }
+
+    /// The same for these of its joints, in this order, where each has a path of its own.
+    pub fn of_joints(&self, joints: &[String]) -> JointTopic {
+        let mut of = self.clone();
+        if let Some(field) = of.field.as_mut().filter(|f| f.name.is_none() && !self.names.is_empty()) {
+            let place = |joint: &String| self.names.iter().position(|name| name == joint);
+            let path = |joint| self.field.as_ref()?.positions.get(place(joint)?).cloned();
+            field.positions = joints.iter().filter_map(path).collect();
+            field.values = joints.len();
+            of.names = joints.to_vec();
+        }
+        of
     }
 }
 
@@ -47,9 +61,9 @@ impl BodyTopic {
 /// Where joint readings are in a message.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// Path of the positions.
-    pub position: String,
-    /// Path of the names of the joints, if they have any.
+    /// Path of the positions, or one for each joint.
+    pub positions: Vec<String>,
+    /// Path of the names of the joints, if a field has them.
     pub name: Option<String>,
     /// How many joints.
     pub values: usize,

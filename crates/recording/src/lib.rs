@@ -6,7 +6,7 @@
 //!   `chunk` (inflated and checked), `channels`;
 //! * `foreign`: of another format, such as rosbag2's database, a copy of its messages;
 //! * `recording`: its files, opened; `judge` holds the records of a block against its indexes, `sweep` passes over all blocks in
-//!   parallel, results in file order; what was read is compared with whatever else says what was written (`witness`, of rosbag2
+//!   parallel, results in file order; channels without a usable definition get one (`substitute`); what was read is compared with whatever else says what was written (`witness`, of rosbag2
 //!   `bag`). A disagreement is data lost, which the process remembers ([`data_loss_warnings`]);
 //! * `decode`: messages to rows;
 //! * `streams`: `gather` (rows of a stream; of bodies that hang on others the `transforms` between), `reading` (columns: clock,
@@ -52,7 +52,7 @@ pub use streams::{
     Axis, Encoder, GaugeStream, JointStream, JointUnit, LengthUnit, PoseStream, ScalarStream, Streams,
 };
 pub use structure::raw::{
-    Attachment, MetadataVisitor, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor,
+    Attachment, MetadataVisitor, RawChannel, RawMessage, RawMetadata, RawSchema, RawVisitor, ReadBy,
 };
 pub use write::extract::{Extract, Extracted, extract};
 pub use write::guard::{

@@ -147,8 +147,8 @@ fn proposal_text(proposal: &Proposal) -> String {
             if tried.mistakes.is_empty() && !proposal.is_plausible() {
                 let _ = writeln!(
                     out,
-                    " So large an error is none of an arm that is read rightly: look at the order, signs, units and zeros of the \
-                     joints, at which body is the tip, and whether the model is of this arm."
+                    " So large an error is seldom of the arm alone: look at the order, signs, units and zeros of the joints, at which \
+                     body is the tip, whether the model is of this arm, and whether anything moved meanwhile."
                 );
             }
         }
@@ -165,7 +165,7 @@ fn proposal_text(proposal: &Proposal) -> String {
     );
     let next = match proposal.runs() {
         true => format!("armcal run {}", proposal.out.display()),
-        false => "mend what is said above, here or in the pipeline".to_owned(),
+        false => "mend what is said above, here or in the pipeline; a run tells more of it".to_owned(),
     };
     let _ = writeln!(out, " next:  {next}");
     out

@@ -100,7 +100,11 @@ impl Draft<'_> {
         };
         self.page.line(&format!("names = {}", toml_list(&joints.names)), why);
         if let Some(field) = &source.field {
-            self.page.line(&format!("position = {}", toml_string(&field.position)), &field.why);
+            let paths = match field.positions.as_slice() {
+                [only] => toml_string(only),
+                several => toml_list(several),
+            };
+            self.page.line(&format!("position = {paths}"), &field.why);
             if let Some(name) = &field.name {
                 self.page.line(&format!("name = {}", toml_string(name)), "the names beside them");
             }

@@ -21,6 +21,8 @@ pub(super) struct JointSink<'r, 'm> {
     position: f64,
     effort: f64,
     any_effort: bool,
+    /// Joints read so far that have a path each.
+    joints: usize,
     /// Where `position` and `effort` are among the named values of the item.
     interfaces: usize,
     position_at: Option<usize>,
@@ -42,17 +44,29 @@ impl<'r> JointSink<'r, '_> {
             position: f64::NAN,
             effort: f64::NAN,
             any_effort: false,
+            joints: 0,
             interfaces: 0,
             position_at: None,
             effort_at: None,
         }
     }
 
+    /// One joint of several was read, each by a path of its own.
+    pub(super) fn end_joint(&mut self) {
+        let from = self.position_start + self.joints;
+        // Of a field that a message repeats the last counts; one that it leaves out is what the encoding says, or none.
+        let read = self.rows.position.get(from..).and_then(<[f64]>::last).copied();
+        self.rows.position.truncate(from);
+        self.rows.position.push(read.unwrap_or(self.position));
+        (self.joints, self.position) = (self.joints + 1, f64::NAN);
+    }
+
     /// Appends the row, if the message has positions; on an error the rows are as before.
     pub(super) fn finish(self, decoded: Result<(), DecodeError>) -> Result<(), DecodeError> {
         let checked = decoded.and_then(|()| self.check());
-        let positions = self.rows.position.len() - self.position_start;
-        if checked.is_err() || positions == 0 {
+        let positions = &self.rows.position[self.position_start..];
+        let none = positions.is_empty() || self.joints > 0 && positions.iter().all(|q| q.is_nan());
+        if checked.is_err() || none {
             self.rows.position.truncate(self.position_start);
             self.rows.effort.truncate(self.effort_start);
             return checked;

@@ -8,9 +8,11 @@
 mod binary;
 mod cursor;
 mod error;
+mod inferred;
 mod joint_sink;
 mod json;
 mod msg;
+mod paths;
 mod pose_sink;
 mod protobuf;
 mod rows;
@@ -21,6 +23,8 @@ mod types;
 mod wire;
 
 pub use error::DecodeError;
+pub(crate) use inferred::InferredTypes;
+pub use paths::{has_list, parent_of};
 pub use rows::{JointRow, JointRows, PoseRow, PoseRows, Rows, ScalarRows};
 pub use shapes::Place;
 
@@ -66,7 +70,7 @@ pub fn readable_as(
     message_encoding: &str,
 ) -> Result<Role, DecodeError> {
     let source = [schema_name, schema_encoding, message_encoding];
-    let (shape, ..) = compile_schema(source, schema_data, shapes::recognise)?;
+    let (shape, ..) = compile_schema(source, schema_data, recognise)?;
     Ok(shape.role)
 }
 
@@ -79,9 +83,35 @@ pub fn fields_for(
     schema_data: &[u8],
     message_encoding: &str,
 ) -> Vec<String> {
-    let find = |_: &str, types: &Types| Ok((shapes::quantities_for(types, place), Wanted::default()));
+    let find = |_: &str, types: &Types| Ok((shapes::quantities_for(types, place), Vec::new()));
     compile_schema([schema_name, schema_encoding, message_encoding], schema_data, find)
         .map_or(Vec::new(), |(fields, ..)| fields)
+}
+
+/// Why the definition of a ROS type that is known as `known` cannot be used: it is in another language than that one, or
+/// unusable, or breaks off before the known one ends. None where it is that one, or another of its own.
+pub(crate) fn ros_problem(
+    name: &str,
+    [language, known_language]: [&str; 2],
+    data: &[u8],
+    known: &str,
+) -> Option<String> {
+    if language != known_language {
+        return Some(format!("it is in {language:?}, which is not read"));
+    }
+    match (msg::parse(data, name), msg::parse(known.as_bytes(), name)) {
+        (Err(why), _) => Some(why),
+        (Ok(own), Ok(whole)) => own.breaks_off(&whole).then(|| "it breaks off".to_owned()),
+        (Ok(_), Err(_)) => None,
+    }
+}
+
+/// Why a schema says nothing of JSON messages.
+pub(crate) fn json_problem(language: &str, data: &[u8]) -> Option<String> {
+    match language {
+        "jsonschema" => json::parse(data).err(),
+        _ => Some(format!("it is in {language:?}, which is not read")),
+    }
 }
 
 /// How to decode the messages of one channel; compiled once from its schema, shared by threads.
@@ -94,7 +124,8 @@ pub struct Plan {
     body: Option<Vec<u8>>,
     /// Whether all bodies of a message are read, each as a row.
     every_body: bool,
-    code: Code,
+    /// One, or one for each joint where each has a path of its own.
+    code: Vec<Code>,
 }
 
 #[derive(Debug)]
@@ -118,7 +149,8 @@ impl Plan {
         body: Option<&str>,
     ) -> Result<Plan, DecodeError> {
         let source = [schema_name, schema_encoding, message_encoding];
-        let (shape, wanted, code) = compile_schema(source, schema_data, shapes::recognise)?;
+        let (shape, wanted, code) = compile_schema(source, schema_data, recognise)?;
+        let has = |slot| wanted.iter().any(|wanted| wanted.has(slot));
         if shape.role != role {
             return Err(DecodeError::OtherRole {
                 schema: schema_name.to_owned(),
@@ -127,8 +159,8 @@ impl Plan {
             });
         }
         if let Some(body) = body
-            && !wanted.has(Slot::Body)
-            && !wanted.has(Slot::BodyIndex)
+            && !has(Slot::Body)
+            && !has(Slot::BodyIndex)
             && !shape.by_place
         {
             return Err(DecodeError::NoBodyName { schema: schema_name.to_owned(), body: body.to_owned() });
@@ -144,7 +176,8 @@ impl Plan {
     }
 
     /// Compiles the plan that reads `role` out of the fields at these paths, as `schema_data` defines them; the first is the
-    /// one that stamp and frame belong to. `[]` in a path marks a list, `*` at its end stands for all fields of a message.
+    /// one that stamp and frame belong to. `[]` in a path marks a list, `*` at its end stands for all fields of a message. Of
+    /// several positions each is one number, of a joint each: a message without one has NaN there.
     pub fn at(
         role: Role,
         schema_name: &str,
@@ -153,9 +186,14 @@ impl Plan {
         message_encoding: &str,
         (body, fields): (Option<&str>, &[(Place, &str)]),
     ) -> Result<Plan, DecodeError> {
-        let find = |schema: &str, types: &Types| Ok(((), shapes::locate_fields(schema, types, fields)?));
-        let ((), _, code) =
-            compile_schema([schema_name, schema_encoding, message_encoding], schema_data, find)?;
+        let positions = fields.iter().filter(|(place, _)| *place == Place::Positions).count();
+        let find = |schema: &str, types: &Types| {
+            let locate = |fields| shapes::locate_fields(schema, types, fields);
+            let wanted = fields.chunks(if positions > 1 { 1 } else { fields.len().max(1) }).map(locate);
+            Ok(((), wanted.collect::<Result<Vec<Wanted>, _>>()?))
+        };
+        let source = [schema_name, schema_encoding, message_encoding];
+        let ((), _, code) = compile_schema(source, schema_data, find)?;
         let body = body.map(|b| b.as_bytes().to_vec());
         Ok(Plan { role, in_millimetres: false, by_place: true, body, every_body: false, code })
     }
@@ -163,8 +201,10 @@ impl Plan {
     /// The same plan, which refuses messages that do not end where their definition does: for definitions that did not
     /// come with the messages.
     pub fn exact(mut self) -> Plan {
-        if let Code::Binary(code) = &mut self.code {
-            code.go_to_the_end();
+        for code in &mut self.code {
+            if let Code::Binary(code) = code {
+                code.go_to_the_end();
+            }
         }
         self
     }
@@ -195,7 +235,13 @@ impl Plan {
             (Role::Joints, Rows::Joints(rows)) => {
                 let value = self.json_value(data)?;
                 let mut sink = joint_sink::JointSink::new(rows);
-                let decoded = self.run(data, &value, &mut sink);
+                let decoded = self.code.iter().try_for_each(|code| {
+                    code.run(data, &value, &mut sink)?;
+                    if self.code.len() > 1 {
+                        sink.end_joint();
+                    }
+                    Ok(())
+                });
                 sink.finish(decoded)
             }
             (Role::Pose, Rows::Pose(rows)) => {
@@ -233,9 +279,9 @@ impl Plan {
 
     /// The parsed text of a JSON message; null for the other encodings.
     fn json_value(&self, data: &[u8]) -> Result<serde_json::Value, DecodeError> {
-        match &self.code {
-            Code::Json(_) => json::parse_message(data),
-            Code::Binary(_) | Code::Protobuf(_) => Ok(serde_json::Value::Null),
+        match self.code.first() {
+            Some(Code::Json(_)) => json::parse_message(data),
+            _ => Ok(serde_json::Value::Null),
         }
     }
 
@@ -245,7 +291,18 @@ impl Plan {
         value: &'m serde_json::Value,
         sink: &mut S,
     ) -> Result<(), DecodeError> {
-        match &self.code {
+        self.code.iter().try_for_each(|code| code.run(data, value, sink))
+    }
+}
+
+impl Code {
+    fn run<'m, S: Sink<'m>>(
+        &self,
+        data: &'m [u8],
+        value: &'m serde_json::Value,
+        sink: &mut S,
+    ) -> Result<(), DecodeError> {
+        match self {
             Code::Binary(code) => code.run(data, sink),
             Code::Protobuf(code) => code.run(data, sink),
             Code::Json(code) => code.run(value, sink),
@@ -253,34 +310,40 @@ impl Plan {
     }
 }
 
-/// What `find` makes of the message types of a schema, where its values are, and the code that reads them. The source is the
-/// schema's name and encoding and that of the messages.
+/// The shape that fits these types, and where its values are.
+fn recognise(schema: &str, types: &Types) -> Result<(&'static shapes::Shape, Vec<Wanted>), DecodeError> {
+    shapes::recognise(schema, types).map(|(shape, wanted)| (shape, vec![wanted]))
+}
+
+/// What `find` makes of the message types of a schema, where values are, and the code that reads each of these. The source is
+/// the schema's name and encoding and that of the messages.
 fn compile_schema<T>(
     [schema, schema_encoding, message_encoding]: [&str; 3],
     data: &[u8],
-    find: impl Fn(&str, &Types) -> Result<(T, Wanted), DecodeError>,
-) -> Result<(T, Wanted, Code), DecodeError> {
+    find: impl Fn(&str, &Types) -> Result<(T, Vec<Wanted>), DecodeError>,
+) -> Result<(T, Vec<Wanted>, Vec<Code>), DecodeError> {
     let unusable = |why: String| DecodeError::Schema { schema: schema.to_owned(), why };
     let binary = |encoding: Encoding| {
         let types = msg::parse(data, schema).map_err(unusable)?;
-        let (shape, wanted) = find(schema, &types)?;
-        let code = binary::Code::compile(&types, &wanted, encoding).map_err(unusable)?;
-        Ok((shape, wanted, Code::Binary(code)))
+        let (found, wanted) = find(schema, &types)?;
+        let compile = |wanted| binary::Code::compile(&types, wanted, encoding).map(Code::Binary);
+        let code = wanted.iter().map(compile).collect::<Result<_, _>>().map_err(unusable)?;
+        Ok((found, wanted, code))
     };
     match (schema_encoding, message_encoding) {
         ("ros2msg", "cdr") => binary(Encoding::Cdr),
         ("ros1msg", "ros1") => binary(Encoding::Ros1),
         ("protobuf", "protobuf") => {
             let descriptors = protobuf::Schema::read(schema, data).map_err(unusable)?;
-            let (shape, wanted) = find(schema, &descriptors.types)?;
-            let code = descriptors.compile(&wanted);
-            Ok((shape, wanted, Code::Protobuf(code)))
+            let (found, wanted) = find(schema, &descriptors.types)?;
+            let code = wanted.iter().map(|wanted| Code::Protobuf(descriptors.compile(wanted))).collect();
+            Ok((found, wanted, code))
         }
         ("jsonschema", "json") => {
             let types = json::parse(data).map_err(unusable)?;
-            let (shape, wanted) = find(schema, &types)?;
-            let code = json::Code::compile(&types, &wanted);
-            Ok((shape, wanted, Code::Json(code)))
+            let (found, wanted) = find(schema, &types)?;
+            let code = wanted.iter().map(|wanted| Code::Json(json::Code::compile(&types, wanted))).collect();
+            Ok((found, wanted, code))
         }
         _ => Err(DecodeError::Encoding {
             schema: schema_encoding.to_owned(),

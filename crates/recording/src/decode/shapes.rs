@@ -2,6 +2,7 @@
 //!
 //! Adding one: an entry in [`SHAPES`]. The first shape that fits a schema decides its role.
 
+use super::paths::{has_list, parent_of, spelled, step, unquoted};
 use super::slot::Slot;
 use super::types::{Field, Kind, Number, Repeat, Types};
 use super::{DecodeError, Role};
@@ -281,7 +282,7 @@ pub(super) fn locate_fields(
     for &(place, path) in fields {
         let found = match path.strip_suffix('*').filter(|inside| inside.is_empty() || inside.ends_with('.')) {
             // One number is not a list of them.
-            _ if place == Place::Value && path.contains(['[', '*']) => false,
+            _ if place == Place::Value && has_list(path) => false,
             Some(inside) => add_all(types, &mut wanted, inside, place.part()),
             None => place.part().add(types, &mut wanted, path),
         };
@@ -297,7 +298,8 @@ pub(super) fn locate_fields(
         }
     }
     let path = fields.first().map_or("", |(_, path)| path);
-    let around = || path.rmatch_indices('.').map(|(end, _)| &path[..end]);
+    let dots: Vec<usize> = unquoted(path).filter(|(_, c)| *c == '.').map(|(at, _)| at).collect();
+    let around = || dots.iter().rev().map(|end| &path[..*end]);
     _ = around().chain([""]).any(|inside| Frame.add(types, &mut wanted, inside));
     _ = [""].into_iter().chain(around()).any(|inside| Stamp.add(types, &mut wanted, inside));
     Ok(wanted)
@@ -307,8 +309,8 @@ pub(super) fn locate_fields(
 fn add_all(types: &Types, wanted: &mut Wanted, inside: &str, part: Part) -> bool {
     let mut found = false;
     for path in readable_paths(types, part, |_| true) {
-        let name = path.strip_prefix(inside);
-        found |= name.is_some_and(|name| !name.contains(['.', '['])) && part.add(types, wanted, &path);
+        let is_in = parent_of(&path) == inside.trim_end_matches('.') && !path.ends_with("[]");
+        found |= is_in && part.add(types, wanted, &path);
     }
     found
 }
@@ -326,7 +328,7 @@ fn readable_paths(types: &Types, part: Part, is_wanted: fn(&Field) -> bool) -> V
         // The last is opened first: what it opens comes before its neighbours.
         for field in message.fields.iter().rev() {
             let list = if field.repeat == Repeat::Once { "" } else { "[]" };
-            let path = format!("{inside}{}{list}", field.name);
+            let path = format!("{inside}{}{list}", spelled(&field.name));
             if is_wanted(field) && part.add(types, &mut Wanted::default(), &path) {
                 found.push(path.clone());
             }
@@ -348,7 +350,7 @@ fn readable_paths(types: &Types, part: Part, is_wanted: fn(&Field) -> bool) -> V
 /// The paths at which a message of these types has what a place needs, in fields that are wanted.
 fn fields_for(types: &Types, place: Place, is_wanted: fn(&Field) -> bool) -> Vec<String> {
     let mut found = readable_paths(types, place.part(), is_wanted);
-    found.retain(|path| place != Place::Value || !path.contains('['));
+    found.retain(|path| place != Place::Value || !has_list(path));
     found
 }
 
@@ -419,24 +421,24 @@ impl Part {
 
 /// Adds the value at `path` to what is wanted; false if the path does not lead to a value that fits the slot.
 fn add_value(types: &Types, wanted: &mut Wanted, path: &str, slot: Slot) -> bool {
-    let mut steps = Vec::new();
-    let mut message = 0;
-    let mut segments = path.split('.').peekable();
-    while let Some(segment) = segments.next() {
-        let (name, list) = segment.strip_suffix("[]").map_or((segment, false), |name| (name, true));
-        let Some((index, field)) = types.messages[message].field(name) else { return false };
-        if list == (field.repeat == Repeat::Once) {
-            return false;
-        }
-        match (field.kind, segments.peek()) {
-            (Kind::Message(inner), Some(_)) => message = inner,
-            (_, None) if fits_slot(field, slot) => {}
-            _ => return false,
-        }
-        steps.push(index);
-    }
+    let Some(steps) = find_steps(types, 0, path, slot) else { return false };
     insert_path(wanted, &steps, slot);
     true
+}
+
+/// The fields that a path goes through, by their indices. A dot parts names where it can, before it is part of one.
+fn find_steps(types: &Types, message: usize, path: &str, slot: Slot) -> Option<Vec<usize>> {
+    let fields = || types.messages[message].fields.iter().enumerate();
+    let (plain, dotted): (Vec<_>, Vec<_>) = fields().partition(|(_, field)| !field.name.contains('.'));
+    plain.into_iter().chain(dotted).find_map(|(index, field)| match (step(path, field)?, field.kind) {
+        ("", _) => fits_slot(field, slot).then(|| vec![index]),
+        (rest, Kind::Message(inner)) => {
+            let mut steps = find_steps(types, inner, rest, slot)?;
+            steps.insert(0, index);
+            Some(steps)
+        }
+        _ => None,
+    })
 }
 
 /// Whether the values of a field can go into a slot.

@@ -68,14 +68,29 @@ pub(super) enum Repeat {
     Sequence,
 }
 
-impl MessageType {
-    /// The field of this name and its index.
-    pub(super) fn field(&self, name: &str) -> Option<(usize, &Field)> {
-        self.fields.iter().enumerate().find(|(_, field)| field.name == name)
-    }
-}
-
 impl Types {
+    /// Whether these are `whole` up to somewhere before its end, as a text leaves them that was cut off.
+    pub(super) fn breaks_off(&self, whole: &Types) -> bool {
+        self.begins(0, whole, 0) == Some(false)
+    }
+
+    /// Whether a message is all of another one; `None` if it is no beginning of it either.
+    fn begins(&self, own: usize, whole: &Types, other: usize) -> Option<bool> {
+        let (own, other) = (&self.messages[own].fields, &whole.messages[other].fields);
+        let mut all = own.len() == other.len();
+        for (field, known) in own.iter().zip(other) {
+            match (field.kind, known.kind) {
+                _ if field.name != known.name || field.repeat != known.repeat => return None,
+                (Kind::Message(a), Kind::Message(b)) => all &= self.begins(a, whole, b)?,
+                // A stamp may be taken for granted.
+                (Kind::Time, Kind::Message(_)) | (Kind::Message(_), Kind::Time) => {}
+                (a, b) if a != b => return None,
+                _ => {}
+            }
+        }
+        (own.len() <= other.len()).then_some(all)
+    }
+
     /// The field names of the channel's message, for error messages.
     pub(super) fn field_names(&self) -> String {
         let names: Vec<&str> = self.messages[0].fields.iter().map(|f| f.name.as_str()).collect();

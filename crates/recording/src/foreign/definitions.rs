@@ -1,4 +1,4 @@
-//! Definitions of ROS 2 messages for databases that do not hold them (rosbag2 before Iron).
+//! Definitions of ROS messages for databases that do not hold them (rosbag2 before Iron) and files that hold only part of them.
 
 /// A message type and its own definition.
 pub(crate) const TYPES: &[(&str, &str)] = &[
@@ -41,6 +41,8 @@ pub(crate) const TYPES: &[(&str, &str)] = &[
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
     ),
     ("sensor_msgs/Temperature", "std_msgs/Header header\nfloat64 temperature\nfloat64 variance\n"),
+    ("std_msgs/Float32", "float32 data\n"),
+    ("std_msgs/Float32MultiArray", "MultiArrayLayout layout\nfloat32[] data\n"),
     ("std_msgs/Float64", "float64 data\n"),
     ("std_msgs/Float64MultiArray", "MultiArrayLayout layout\nfloat64[] data\n"),
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"),
@@ -53,7 +55,19 @@ pub(crate) const TYPES: &[(&str, &str)] = &[
 /// The definition of a message type, such as `sensor_msgs/msg/JointState`, with all that it uses, in the `ros2msg` format
 /// of MCAP; `None` if the type is not known here.
 pub(crate) fn full_text(name: &str) -> Option<String> {
-    let root = name.replacen("/msg/", "/", 1);
+    text_with(name, own_text)
+}
+
+/// The same of ROS 1, in its `ros1msg` format: only the header is another.
+pub(crate) fn ros1_text(name: &str) -> Option<String> {
+    text_with(name, |name| match name {
+        "std_msgs/Header" => Some("uint32 seq\ntime stamp\nstring frame_id\n"),
+        _ => own_text(name),
+    })
+}
+
+fn text_with(name: &str, own_text: fn(&str) -> Option<&'static str>) -> Option<String> {
+    let root = name.replace("::", "/").replacen("/msg/", "/", 1);
     let mut text = own_text(&root)?.to_owned();
     let mut used = vec![root];
     let mut at = 0;

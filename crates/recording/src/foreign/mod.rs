@@ -18,7 +18,8 @@ mod rosbag2;
 mod wal;
 
 #[cfg(test)]
-pub(crate) use definitions::{TYPES as KNOWN_TYPES, full_text as definition_of};
+pub(crate) use definitions::TYPES as KNOWN_TYPES;
+pub(crate) use definitions::{full_text as definition_of, ros1_text as ros1_definition_of};
 pub use inflate::inflate_message;
 pub(crate) use wal::identity as log_identity;
 

@@ -117,7 +117,7 @@ impl Recording {
             let channel: &RawChannel = channel;
             let tally = tally.unwrap_or(Tally { messages: 0, first_ns: 0, last_ns: 0 });
             let schema = channel.schema.as_ref();
-            let compiled = (schema.map(Arc::as_ptr), &*channel.message_encoding);
+            let compiled = (channel.definition().map(Arc::as_ptr), &*channel.message_encoding);
             ChannelReport {
                 topic: channel.topic.clone(),
                 schema: schema.map_or(&none, |schema| &schema.name).clone(),
@@ -143,7 +143,7 @@ fn channel_key(channel: &RawChannel) -> [&str; 4] {
 }
 
 fn readable_as(channel: &RawChannel) -> Result<&'static str, Arc<str>> {
-    let Some(schema) = &channel.schema else {
+    let Some(schema) = channel.definition() else {
         return Err("the channel has no schema".into());
     };
     decode::readable_as(&schema.name, &schema.encoding, &schema.data, &channel.message_encoding)

@@ -6,6 +6,7 @@ pub(crate) mod judge;
 pub(crate) mod judged;
 pub(crate) mod losses;
 pub(crate) mod open;
+pub(crate) mod substitute;
 pub(crate) mod sweep;
 pub(crate) mod visit;
 pub(crate) mod whole;

@@ -44,6 +44,7 @@ impl Recording {
         let passes = Allowance::of_passes(files.iter().map(|file| file.original().len()).sum());
         let mut recording = Recording { files, surveys, judged: OnceLock::new(), passes };
         recording.complete_definitions()?;
+        recording.substitute_definitions()?;
         Ok(recording)
     }
 

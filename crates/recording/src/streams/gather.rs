@@ -184,7 +184,7 @@ fn compile_targets(
 }
 
 fn compile_channel(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(Plan, f64), String> {
-    let Some(schema) = &channel.schema else {
+    let Some(schema) = channel.definition() else {
         return Err("a channel without a schema cannot be decoded".to_owned());
     };
     let (kind, fields) = (request.kind, request.fields.as_slice());
@@ -201,8 +201,9 @@ fn compile_channel(channel: &Arc<RawChannel>, request: &Request<'_>) -> Result<(
     };
     let plan = plan.map_err(|e| e.to_string())?;
     let plan = if let Kind::Transforms { .. } = kind { plan.every_body() } else { plan };
-    let plan =
-        if channel.metadata.iter().any(|(key, _)| key == DEFINITION_FROM) { plan.exact() } else { plan };
+    let not_its_own =
+        channel.read_by.is_some() || channel.metadata.iter().any(|(key, _)| key == DEFINITION_FROM);
+    let plan = if not_its_own { plan.exact() } else { plan };
     // Types that are millimetres by definition are so whatever the configuration says.
     let to_m = match kind {
         Kind::Pose { .. } | Kind::Transforms { .. } if plan.in_millimetres() => LengthUnit::Mm.to_m(),

@@ -1,6 +1,6 @@
 //! Joint rows to columns in the order of the model: selection by name, units, quantisation.
 
-use crate::decode::JointRow;
+use crate::decode::{JointRow, has_list};
 use crate::error::nearest_name;
 use crate::streams::clean::quantisation_step;
 use crate::streams::columns::concat_parts;
@@ -89,7 +89,8 @@ impl JointTable {
         let wanted = stream.names.len();
         let why = match (missing, self.unnamed) {
             (_, Some(values)) if self.present.is_empty() => format!(
-                "its messages name no joints and hold {values} values, {wanted} joints are wanted: correct `names`"
+                "its messages name no joints and hold {values} values, {wanted} joints are wanted: correct `names`, or give \
+                 `position` a path for each"
             ),
             (Some(joint), _) => {
                 return RecordingError::JointMissing {
@@ -123,9 +124,7 @@ pub(crate) fn check_config(stream: &JointStream) -> Result<(), RecordingError> {
     if distinct.len() != stream.names.len() {
         return wrong(format!("`names` lists a joint twice: {:?}", stream.names));
     }
-    if stream.position.is_none() && (stream.name.is_some() || stream.effort.is_some()) {
-        return wrong("`name` and `effort` are paths of fields beside `position`: give it too".into());
-    }
+    check_paths(stream)?;
     if !(stream.max_turns.is_finite() && stream.max_turns > 0.0) {
         return wrong(format!("`max_turns` must be positive, not {}", stream.max_turns));
     }
@@ -163,6 +162,28 @@ impl JointStream {
             JointUnit::Deg => 1.0_f64.to_degrees(),
             JointUnit::Counts => self.encoders.iter().map(|e| e.counts_per_turn / TAU).fold(1.0, f64::max),
         }
+    }
+}
+
+fn check_paths(stream: &JointStream) -> Result<(), RecordingError> {
+    let wrong = |why: String| Err(RecordingError::Config { role: ROLE, why });
+    let (paths, joints) = (stream.position.len(), stream.names.len());
+    let has_more = stream.name.is_some() || stream.effort.is_some();
+    match stream.position.iter().find(|path| has_list(path)) {
+        _ if paths == 0 && has_more => {
+            wrong("`name` and `effort` are paths of fields beside `position`: give it too".into())
+        }
+        _ if paths < 2 => Ok(()),
+        _ if has_more => {
+            wrong("`position` has a path for each joint: `name` and `effort` are read beside one list".into())
+        }
+        Some(list) => {
+            wrong(format!("`position` has several paths, each of one number, and {list} is a list"))
+        }
+        None if paths != joints => wrong(format!(
+            "`position` has {paths} paths for {joints} joints: give one each, in the order of `names`"
+        )),
+        None => Ok(()),
     }
 }
 

@@ -23,17 +23,18 @@ use crate::Clock;
 use crate::decode::Place;
 pub use mend::Axis;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::de::{IntoDeserializer as _, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::marker::PhantomData;
 
 /// The streams to read. Only `joints` is required.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Streams {
     /// Encoder readings: one stream, or several (`[[streams.joints]]`), which are read as one.
-    #[serde(deserialize_with = "one_or_more")]
+    #[serde(deserialize_with = "one_or_more_streams")]
     pub joints: Vec<JointStream>,
     /// What the controller asked of the joints; where it is recorded, paths are compared with what was planned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -84,9 +85,14 @@ pub struct JointStream {
     #[serde(default)]
     pub names: Vec<String>,
     /// Where the positions are in messages that armcal does not know, such as `measured_joint_state.position[]`: `[]` marks
-    /// a list, `*` at the end all fields of a message.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub position: Option<String>,
+    /// a list, `*` at the end all fields of a message. Several paths are one number each, in the order of `names`.
+    #[serde(
+        default,
+        deserialize_with = "one_or_more_paths",
+        serialize_with = "one_or_list",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub position: Vec<String>,
     /// With `position`: where the names of the joints are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -124,11 +130,10 @@ impl JointStream {
 
     /// The fields that the pipeline names, by their paths; the positions come first.
     pub(crate) fn fields(&self) -> Vec<(Place, &str)> {
-        configured_paths([
-            (Place::Positions, &self.position),
-            (Place::Names, &self.name),
-            (Place::Efforts, &self.effort),
-        ])
+        let positions = self.position.iter().map(|path| (Place::Positions, path.as_str()));
+        positions
+            .chain(configured_paths([(Place::Names, &self.name), (Place::Efforts, &self.effort)]))
+            .collect()
     }
 }
 
@@ -137,7 +142,7 @@ impl Default for JointStream {
         JointStream {
             topic: String::new(),
             names: Vec::new(),
-            position: None,
+            position: Vec::new(),
             name: None,
             effort: None,
             unit: JointUnit::Rad,
@@ -151,22 +156,40 @@ impl Default for JointStream {
     }
 }
 
-/// A table, or an array of tables.
-fn one_or_more<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<JointStream>, D::Error> {
-    struct Either;
-    impl<'de> Visitor<'de> for Either {
-        type Value = Vec<JointStream>;
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("[streams.joints], or one [[streams.joints]] for each of several streams")
-        }
-        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-            Ok(vec![JointStream::deserialize(MapAccessDeserializer::new(map))?])
-        }
-        fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
-            Vec::deserialize(SeqAccessDeserializer::new(seq))
-        }
+fn one_or_more_streams<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<JointStream>, D::Error> {
+    let expected = "[streams.joints], or one [[streams.joints]] for each of several streams";
+    deserializer.deserialize_any(OneOrMore(expected, PhantomData))
+}
+
+fn one_or_more_paths<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
+    deserializer
+        .deserialize_any(OneOrMore("the path of a field, or a list of one for each joint", PhantomData))
+}
+
+fn one_or_list<S: Serializer>(paths: &[String], serializer: S) -> Result<S::Ok, S::Error> {
+    match paths {
+        [only] => only.serialize(serializer),
+        several => several.serialize(serializer),
     }
-    deserializer.deserialize_any(Either)
+}
+
+/// A table or a text, or an array of them; and what is expected in words.
+struct OneOrMore<T>(&'static str, PhantomData<T>);
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for OneOrMore<T> {
+    type Value = Vec<T>;
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0)
+    }
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+        Ok(vec![T::deserialize(MapAccessDeserializer::new(map))?])
+    }
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Self::Value, E> {
+        Ok(vec![T::deserialize(text.into_deserializer())?])
+    }
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+        Vec::deserialize(SeqAccessDeserializer::new(seq))
+    }
 }
 
 fn default_max_turns() -> f64 {
@@ -336,6 +359,22 @@ mod tests {
         assert_eq!(e.to_rad(1024.0), -0.0);
         assert!((e.to_rad(0.0) - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
         assert!((e.to_rad(1024.0 + 4096.0) + std::f64::consts::TAU).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_position_is_a_path_or_one_for_each_joint() {
+        let read = |position: &str| {
+            toml::from_str::<JointStream>(&format!(
+                "topic = \"/j\"\nnames = [\"a\", \"b\"]\nposition = {position}\n"
+            ))
+        };
+        for (position, paths) in [("\"q[]\"", vec!["q[]"]), ("[\"'a.b'\", \"c\"]", vec!["'a.b'", "c"])] {
+            let stream = read(position).expect("a stream");
+            assert_eq!(stream.position, paths);
+            let written = toml::to_string(&stream).expect("TOML");
+            assert!(written.contains(&format!("position = {position}")), "{written}");
+        }
+        assert!(read("3").expect_err("a number").to_string().contains("path of a field"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Channel and schema definitions of one file.
 
 use crate::bytes::budget::most_definition_bytes;
-use crate::structure::raw::{RawChannel, RawSchema};
+use crate::structure::raw::{RawChannel, RawSchema, ReadBy};
 use crate::structure::records::{Cursor, RawRecord};
 use mcap::records::op;
 use std::collections::BTreeMap;
@@ -171,6 +171,15 @@ impl Definitions {
         }
     }
 
+    /// Says what resolved channels are read by, where it is not their own schema.
+    pub fn substitute(&mut self, mut read_by: impl FnMut(u16, &RawChannel) -> Option<Arc<ReadBy>>) {
+        for (id, channel) in &mut self.channels {
+            if let Some(found) = read_by(*id, &channel.raw) {
+                Arc::make_mut(&mut channel.raw).read_by = Some(found);
+            }
+        }
+    }
+
     /// Adds an entry to the metadata of resolved channels.
     pub fn annotate(&mut self, entry: impl Fn(&RawChannel) -> Option<(String, String)>) {
         for channel in self.channels.values_mut() {
@@ -235,6 +244,6 @@ fn parse_channel(body: &[u8]) -> Option<(u16, Channel)> {
         return None;
     }
     let metadata = fields.map(Cursor::string, Cursor::string)?.into_iter().collect();
-    let raw = RawChannel { topic, schema: None, message_encoding, metadata };
+    let raw = RawChannel { topic, schema: None, message_encoding, metadata, read_by: None };
     Some((id, Channel { schema_id, raw: Arc::new(raw) }))
 }

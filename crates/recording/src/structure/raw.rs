@@ -16,6 +16,15 @@ pub struct RawSchema {
     pub data: Vec<u8>,
 }
 
+/// A definition in the place of a channel's own.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct ReadBy {
+    /// The definition.
+    pub schema: Arc<RawSchema>,
+    /// Why the channel's own is not used.
+    pub why: String,
+}
+
 /// A channel as the file has it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RawChannel {
@@ -27,6 +36,15 @@ pub struct RawChannel {
     pub message_encoding: Arc<str>,
     /// Free-form metadata, such as QoS.
     pub metadata: Vec<(String, String)>,
+    /// What its messages are read by where its schema says nothing of them.
+    pub read_by: Option<Arc<ReadBy>>,
+}
+
+impl RawChannel {
+    /// What its messages are read by: its schema, or what stands in its place.
+    pub fn definition(&self) -> Option<&Arc<RawSchema>> {
+        self.read_by.as_ref().map(|read_by| &read_by.schema).or(self.schema.as_ref())
+    }
 }
 
 /// One message, its bytes borrowed.

@@ -54,7 +54,7 @@ fn streams(position: &str, frame: Option<&str>) -> Streams {
     let joints = JointStream {
         topic: "/q".into(),
         names: vec!["a".into(), "b".into()],
-        position: Some(position.into()),
+        position: vec![position.into()],
         ..JointStream::default()
     };
     let tip = PoseStream { topic: "/tip".into(), frame: frame.map(str::to_owned), ..PoseStream::default() };
@@ -87,7 +87,7 @@ fn wrong_fields_and_frames_name_what_there_is() {
     let path = why(&streams("dat[]", None));
     assert!(path.contains("/q") && path.contains("did you mean \"data[]\"?"), "{path}");
     let mut no_position = streams("data[]", None);
-    no_position.joints[0].position = None;
+    no_position.joints[0].position.clear();
     no_position.joints[0].effort = Some("effort[]".into());
     assert!(why(&no_position).contains("`position`"));
     let mut no_position = streams("data[]", None);

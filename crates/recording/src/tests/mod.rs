@@ -10,6 +10,7 @@ mod mutation;
 mod output;
 mod ranges;
 mod streams;
+mod substitute;
 mod transforms;
 
 use crate::{Access, Recording};
@@ -22,6 +23,7 @@ use std::path::PathBuf;
 /// Messages of one channel to write.
 pub(crate) struct Track {
     pub topic: &'static str,
+    /// Of empty texts none.
     pub schema: (&'static str, &'static str, &'static [u8]),
     pub encoding: &'static str,
     /// Log time [ns], publish time [ns], data.
@@ -93,7 +95,10 @@ fn add(
     schema: (&str, &str, &[u8]),
     encoding: &str,
 ) -> u16 {
-    let schema = writer.add_schema(schema.0, schema.1, schema.2).expect("a schema");
+    let schema = match schema {
+        ("", "", b"") => 0,
+        (name, encoding, data) => writer.add_schema(name, encoding, data).expect("a schema"),
+    };
     writer.add_channel(schema, topic, encoding, &BTreeMap::new()).expect("a channel")
 }
 

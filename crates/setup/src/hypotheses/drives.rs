@@ -88,8 +88,8 @@ fn shares_of_ranges(inputs: &Inputs) -> Vec<Hypothesis> {
     }
     // What the whole range reads, from its middle, and where the middle reads.
     let scales = [
-        ("per cent of their range, from -100 to 100", 100.0 * DEGREES, 0.0),
-        ("per cent of their range, from 0 to 100", 50.0 * DEGREES, 50.0 * DEGREES),
+        ("per cent of their range, from -100 to 100", 100.0 / DEGREES, 0.0),
+        ("per cent of their range, from 0 to 100", 50.0 / DEGREES, 50.0 / DEGREES),
         ("shares of their range, from -1 to 1", 1.0, 0.0),
         ("shares of their range, from 0 to 1", 0.5, 0.5),
     ];

@@ -54,6 +54,35 @@ fn poses_through_references() {
     assert!(matches!(cut, DecodeError::Malformed { encoding: "json", .. }), "{cut}");
 }
 
+/// Fields of several names that only quotes can tell apart, in another order than that of the message; one is missing.
+#[test]
+fn a_number_for_each_joint_comes_in_the_order_of_the_paths() {
+    let schema = r#"{"type":"object","properties":{"timestamp":{"type":"object","properties":{"sec":{"type":"integer"},
+        "nsec":{"type":"integer"}}},"a.pos":{"type":"number"},"a":{"type":"object","properties":{"pos":{"type":"number"},
+        "it's":{"type":"number"}}},"q[]":{"type":"number"},"w.x":{"type":"object","properties":{"q":{"type":"number"}}}}}"#;
+    let read = |paths: &[&str], message: &[u8]| {
+        let fields: Vec<(Place, &str)> = paths.iter().map(|path| (Place::Positions, *path)).collect();
+        let plan = Plan::at(Role::Joints, "any", "jsonschema", schema.as_bytes(), "json", (None, &fields))?;
+        decode(&plan, message)
+    };
+    let message =
+        br#"{"timestamp":{"sec":1,"nsec":2},"a.pos":1,"a":{"pos":2,"it's":3},"q[]":4,"w.x":{"q":5}}"#;
+    let paths = ["w.x.q", "'q[]'", "a.'it''s'", "a.pos", "'a.pos'"];
+    let rows = joints(read(&paths, message));
+    assert_eq!(
+        (rows.row(0).position, rows.row(0).stamp_ns),
+        (&[5.0, 4.0, 3.0, 2.0, 1.0][..], Some(1_000_000_002))
+    );
+    let rows = joints(read(&["'q[]'", "'a.pos'"], br#"{"a.pos":1,"q[]":null}"#));
+    assert!(rows.row(0).position[0].is_nan() && rows.row(0).position[1] == 1.0);
+    assert!(joints(read(&["'q[]'", "'a.pos'"], b"{}")).is_empty());
+    let refused = read(&["'q[]'", "'a.poss'"], message).expect_err("nowhere").to_string();
+    assert!(refused.contains("did you mean \"'a.pos'\"?") && refused.contains("a.'it''s'"), "{refused}");
+    // All of a message are in the order of its definition, whatever they are called.
+    assert_eq!(joints(read(&["*"], message)).row(0).position, [1.0, 4.0]);
+    assert_eq!(joints(read(&["a.*"], message)).row(0).position, [2.0, 3.0]);
+}
+
 /// vicon_bridge appends the markers that no subject owns, without names.
 #[test]
 fn unlabelled_markers_are_not_a_body() {

@@ -1,6 +1,9 @@
 //! Protobuf messages with the descriptors that Foxglove ships.
 
 use super::*;
+use prost::Message as _;
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 
 fn plan(role: Role, schema: &str, descriptors: &str, body: Option<&str>) -> Result<Plan, DecodeError> {
     Plan::compile(role, schema, "protobuf", &hex(descriptors), "protobuf", body)
@@ -69,4 +72,33 @@ fn descriptors_that_do_not_define_the_message_are_refused() {
     let error =
         Plan::compile(Role::Pose, "a.B", "protobuf", b"\xff\xff", "protobuf", None).expect_err("garbage");
     assert!(matches!(error, DecodeError::Schema { .. }), "{error}");
+}
+
+/// Tags in another order than the definition, and a zero that proto3 leaves out: the joints stay in their places.
+#[test]
+fn each_of_several_paths_keeps_its_place() {
+    let field = |(name, number): (&str, i32)| FieldDescriptorProto {
+        name: Some(name.to_owned()),
+        number: Some(number),
+        label: Some(Label::Optional.into()),
+        r#type: Some(Type::Double.into()),
+        ..FieldDescriptorProto::default()
+    };
+    let message = DescriptorProto {
+        name: Some("State".to_owned()),
+        field: [("elbow", 3), ("wrist", 1), ("shoulder", 2)].map(field).to_vec(),
+        ..DescriptorProto::default()
+    };
+    let file = FileDescriptorProto {
+        name: Some("state.proto".to_owned()),
+        syntax: Some("proto3".to_owned()),
+        message_type: vec![message],
+        ..FileDescriptorProto::default()
+    };
+    let data = FileDescriptorSet { file: vec![file] }.encode_to_vec();
+    let fields = ["shoulder", "elbow", "wrist"].map(|path| (Place::Positions, path));
+    let plan =
+        Plan::at(Role::Joints, "State", "protobuf", &data, "protobuf", (None, &fields)).expect("compiles");
+    let message = [&[0x11][..], &0.5_f64.to_le_bytes(), &[0x09], &(-2.0_f64).to_le_bytes()].concat();
+    assert_eq!(joints(decode(&plan, &message)).row(0).position, [0.5, 0.0, -2.0]);
 }
