@@ -170,17 +170,26 @@ impl Streams {
     pub fn mend(&mut self, mend: &Mend) -> bool {
         match mend {
             Mend::Readings { factors, zeros_rad } => {
-                self.only_joints(factors.len()).map(|s| s.mend(factors, zeros_rad))
+                let Some(joints) = self.only_joints(factors.len()) else { return false };
+                joints.mend(factors, zeros_rad);
             }
-            Mend::Order(order) => self.only_joints(order.len()).map(|s| s.reorder(order)),
-            Mend::Axes(matrix) | Mend::AxesOfArm(matrix) => axes_of(matrix)
-                .filter(|_| self.bodies_of(mend).iter().all(|s| s.axes.is_none() && !s.invert))
-                .map(|axes| self.bodies_of(mend).into_iter().for_each(|s| s.axes = Some(axes))),
+            Mend::Order(order) => {
+                let Some(joints) = self.only_joints(order.len()) else { return false };
+                joints.reorder(order);
+            }
+            Mend::Axes(matrix) | Mend::AxesOfArm(matrix) => {
+                let Some(axes) = axes_of(matrix) else { return false };
+                let mut bodies = self.bodies_of(mend);
+                if bodies.iter().any(|s| s.axes.is_some() || s.invert) {
+                    return false;
+                }
+                bodies.iter_mut().for_each(|s| s.axes = Some(axes));
+            }
             Mend::Inverted | Mend::TipInverted => {
-                Some(self.bodies_of(mend).into_iter().for_each(|s| s.invert = !s.invert))
+                self.bodies_of(mend).into_iter().for_each(|s| s.invert = !s.invert);
             }
         }
-        .is_some()
+        true
     }
 
     /// The keys that undo a mistake, for people: `` `invert = true` under [streams.tip] ``.
