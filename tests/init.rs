@@ -25,7 +25,7 @@ fn init(pipeline: &Path, arguments: &[&Path]) -> Output {
 }
 
 /// Mean error on held-out points [mm], without looking for what is missing.
-fn held_out_mm(folder: &Path, name: &str, text: String) -> f64 {
+pub(crate) fn held_out_mm(folder: &Path, name: &str, text: String) -> f64 {
     let pipeline = folder.join(format!("{name}.toml"));
     std::fs::write(&pipeline, text + QUICK).expect("pipeline");
     let summary = run_pipeline(&pipeline, &folder.join(name), &[0, 3]);
@@ -276,7 +276,7 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
 }
 
 /// A simulated session whose messages are changed, and what `armcal init` proposes for it.
-fn changed(folder: &Path, configure: impl Fn(&mut LabConfig), change: impl Fn(&mut Log)) -> String {
+pub(crate) fn changed(folder: &Path, configure: impl Fn(&mut LabConfig), change: impl Fn(&mut Log)) -> String {
     let text = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
     let mut config = LabConfig::from_toml(&text, Path::new("lab.toml")).expect("lab");
     config.task.passes.truncate(1);

@@ -25,6 +25,7 @@ mod finished_results;
 
 /// Are joints and bodies found inside messages of types that nobody told armcal?
 mod init_fields;
+mod init_mends;
 
 /// Does the verdict obey its laws on real arms, whatever noise is declared?
 mod laws;
