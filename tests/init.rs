@@ -276,7 +276,11 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
 }
 
 /// A simulated session whose messages are changed, and what `armcal init` proposes for it.
-pub(crate) fn changed(folder: &Path, configure: impl Fn(&mut LabConfig), change: impl Fn(&mut Log)) -> String {
+pub(crate) fn changed(
+    folder: &Path,
+    configure: impl Fn(&mut LabConfig),
+    change: impl Fn(&mut Log),
+) -> String {
     let text = std::fs::read_to_string(root().join("pipelines/lab/paper-small.toml")).expect("lab");
     let mut config = LabConfig::from_toml(&text, Path::new("lab.toml")).expect("lab");
     config.task.passes.truncate(1);

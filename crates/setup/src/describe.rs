@@ -1,7 +1,7 @@
 //! What a change would do, in words.
 
 use super::beyond;
-use super::hypotheses::{Estimated, Hypothesis, Mending};
+use super::hypotheses::{Estimated, Hypothesis, Mending, bounded_amplitude};
 use super::spread::spread_m;
 use super::trial::Misfit;
 use super::weigh::{SAME_FACTOR, in_doubt};
@@ -11,9 +11,12 @@ use armcal_core::{Certainty, Code, Mend, SetupFinding};
 use armcal_model::{EffectSpec, EffectTable};
 use armcal_recording::Streams;
 use armcal_stages::{Fitted, Inputs};
+use std::collections::BTreeMap;
 
 /// The effect that scales what the sensor sees along each axis.
 const SENSOR_SCALE: &str = "sensor_scale";
+/// How far it may come out from where the search ended.
+const SCALE_BOUND: f64 = 0.05;
 /// Parameters of a change that are told, at most.
 const TOLD: usize = 3;
 
@@ -159,7 +162,9 @@ pub fn moved_frame(now: &Inputs, h: &Hypothesis, from: &Fitted, to: &Fitted) -> 
 pub fn scale_with_interval(mended: &Inputs, h: &Hypothesis) -> Option<String> {
     let near = h.number.as_ref().filter(|_| h.code == Code::PositionScale)?.value;
     let mut with = mended.clone();
-    with.pipeline.effects.push(EffectTable::from(&EffectSpec::new(SENSOR_SCALE)));
+    let free = ["x", "y", "z"].map(|axis| (axis.to_owned(), bounded_amplitude(SCALE_BOUND)));
+    let spec = EffectSpec { overrides: BTreeMap::from(free), ..EffectSpec::new(SENSOR_SCALE) };
+    with.pipeline.effects.push(EffectTable::from(&spec));
     let fitted = with.fit().ok()?;
     let own = |e: &&Estimate| e.parameter.name.starts_with(SENSOR_SCALE);
     let axes: Vec<(f64, f64)> =

@@ -85,7 +85,8 @@ impl JointStream {
     fn mend(&mut self, factors: &[f64], zeros_rad: &[f64]) {
         let now = |list: &[f64], j: usize, nothing: f64| list.get(j).copied().unwrap_or(nothing);
         let (old, moved) = (std::mem::take(&mut self.factors), std::mem::take(&mut self.zeros_deg));
-        self.factors = factors.iter().enumerate().map(|(j, by)| by * now(&old, j, 1.0)).collect();
+        let factor = |(j, by): (usize, &f64)| (by * now(&old, j, 1.0) * 1e6).round() / 1e6;
+        self.factors = factors.iter().enumerate().map(factor).collect();
         let zero =
             |(j, (by, rad)): (usize, (&f64, &f64))| written_deg(by * now(&moved, j, 0.0) + rad.to_degrees());
         self.zeros_deg = factors.iter().zip(zeros_rad).enumerate().map(zero).collect();

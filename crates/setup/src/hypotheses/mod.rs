@@ -12,6 +12,7 @@ mod zeros;
 
 use armcal_core::{Code, Mend, Parameter};
 use armcal_stages::Inputs;
+pub use drives::bounded_amplitude;
 pub use joints::sign_reversal;
 use std::sync::Arc;
 
