@@ -145,7 +145,12 @@ pub fn find(
         match resolve_arm(told, &way, folders, beside) {
             Ok(mut arm) => {
                 arm.unsure.extend(other_fields_note(&arm.source, channels));
-                arm.unsure.extend(found.substituted.iter().cloned());
+                let is_used = |topic: &String| {
+                    *topic == arm.source.topic || found.bodies.iter().any(|b| b.topic == *topic)
+                };
+                let substituted = found.substituted.iter().filter(|(topic, _)| is_used(topic));
+                let said: Vec<String> = substituted.map(|(_, said)| said.clone()).collect();
+                arm.unsure.extend(said);
                 return Ok(arm);
             }
             Err(error) => _ = refused.get_or_insert(error),

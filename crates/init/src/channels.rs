@@ -4,7 +4,6 @@ use super::fields::Fields;
 use super::files::Opened;
 use super::topics::{BodyTopic, JointTopic};
 use crate::error::InitError;
-use armcal_core::Code;
 use armcal_recording::decode::{DecodeError, Plan, Role, Rows, readable_as};
 use armcal_recording::{RawChannel, RawSchema, RecordingError, inflate_message};
 use armcal_stages::RunError;
@@ -39,8 +38,8 @@ pub struct Channels {
     pub unknown: Vec<Unknown>,
     /// Whether a topic may hold joints for all that is known: its messages cannot be read, or not in every recording.
     pub unread: bool,
-    /// What is read by another definition than the file's.
-    pub substituted: BTreeSet<String>,
+    /// What is said of topics that are read by another definition than the file's.
+    pub substituted: BTreeMap<String, String>,
 }
 
 /// Messages of a type that armcal does not know.
@@ -83,6 +82,7 @@ pub fn scan_recordings(opened: &[Opened]) -> Result<Channels, InitError> {
         let mut plans = Plans::default();
         for channel in recording.channels() {
             let topic = own.entry(channel.topic.clone()).or_default();
+            channels.substituted.extend(channel.substitution().map(|said| (channel.topic.clone(), said)));
             let Some(schema) = channel.definition() else {
                 let why = format!("its messages ({}) come without a schema", channel.message_encoding);
                 topic.why_not = Some(Refused { why, unread: true });
@@ -133,12 +133,7 @@ pub fn scan_recordings(opened: &[Opened]) -> Result<Channels, InitError> {
             })
             .and_then(|()| recording.within(&allowance))
             // What the pass found to be lost is noted, whatever becomes of the proposal.
-            .and_then(|()| {
-                let said = recording.whole_report()?.warnings.iter();
-                let said = said.filter(|w| w.code == Code::DefinitionSubstituted);
-                channels.substituted.extend(said.map(|w| w.message.clone()));
-                Ok(())
-            })
+            .and_then(|()| recording.whole_report().map(drop))
             .map_err(|source: RecordingError| RunError::Recording { recording: entry.name(), source })?;
         for (topic, own) in own {
             let all = found.entry(topic).or_default();

@@ -10,8 +10,8 @@ use crate::structure::layout::Layout;
 use crate::structure::raw::RawChannel;
 use crate::structure::survey::{FileSurvey, Tally};
 use crate::{Fetched, FileReport, ObjectIdentity, RecordingError, Source};
-use armcal_core::{Code, Severity, Stage, Warning, list_names};
-use std::collections::{BTreeMap, BTreeSet};
+use armcal_core::{Code, Severity, Stage, Warning};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -233,29 +233,6 @@ impl RecordingFile {
             let text = format!("at byte {}: {}", d.offset, d.why);
             Warning::new(severity, Stage::Recording, code, subject, text)
         };
-        damage.iter().map(warn).chain(self.substitutions()).collect()
-    }
-
-    /// What is read by another definition than its own, once for each reason.
-    fn substitutions(&self) -> Vec<Warning> {
-        let mut topics: BTreeMap<(&str, &str), Vec<String>> = BTreeMap::new();
-        for (_, channel) in self.channels() {
-            if let Some(read_by) = &channel.read_by {
-                topics
-                    .entry((&read_by.schema.encoding, &read_by.why))
-                    .or_default()
-                    .push(channel.topic.clone());
-            }
-        }
-        let warn = |((language, why), topics): ((&str, &str), Vec<String>)| {
-            let by = match language {
-                "jsonschema" => "the fields that they have themselves",
-                _ => "the definition that armcal knows of this type, and those of another length are refused",
-            };
-            let text = format!("messages of {} are read by {by}: {why}", list_names(&topics));
-            let (code, subject) = (Code::DefinitionSubstituted, self.path.display().to_string());
-            Warning::new(Severity::Notice, Stage::Recording, code, subject, text)
-        };
-        topics.into_iter().map(warn).collect()
+        damage.iter().map(warn).collect()
     }
 }

@@ -40,6 +40,8 @@ pub(crate) struct Gathered {
     pub other_bodies: BTreeSet<String>,
     /// Channels of the topic that cannot be read in this role, and why.
     pub unreadable: BTreeSet<String>,
+    /// What is said of channels that are read by another definition than their own.
+    pub substituted: BTreeSet<String>,
     pub stamps: Stamps,
     pub joints: JointTable,
     pub poses: PoseTable,
@@ -94,9 +96,9 @@ pub(crate) fn gather_streams(
 ) -> Result<Vec<Gathered>, RecordingError> {
     let mut wanted: Vec<BTreeMap<u16, Vec<Target>>> = Vec::new();
     wanted.resize_with(recording.files.len(), BTreeMap::new);
-    let mut unreadable = Vec::new();
+    let mut notes = Vec::new();
     for (index, request) in requests.iter().enumerate() {
-        unreadable.push(compile_targets(recording, index, request, &mut wanted)?);
+        notes.push(compile_targets(recording, index, request, &mut wanted)?);
     }
     let channels: Vec<BTreeSet<u16>> = wanted.iter().map(|w| w.keys().copied().collect()).collect();
     let allowance = recording.allowance();
@@ -121,8 +123,13 @@ pub(crate) fn gather_streams(
     for stretch in stretches {
         parts.iter_mut().zip(stretch).for_each(|(parts, part)| parts.push(part.gathered));
     }
-    let whole = parts.into_par_iter().zip(unreadable);
-    Ok(whole.map(|(parts, unreadable)| Gathered { unreadable, ..Gathered::of(parts) }).collect())
+    let whole = parts.into_par_iter().zip(notes);
+    let whole = whole.map(|(parts, [unreadable, substituted])| Gathered {
+        unreadable,
+        substituted,
+        ..Gathered::of(parts)
+    });
+    Ok(whole.collect())
 }
 
 /// How many messages the files say that there are for a request: what room is made for, believed no further than that.
@@ -141,20 +148,22 @@ fn declared_message_count(
     recording.files.iter().zip(wanted).map(of_file).sum()
 }
 
-/// Compiles a plan for every channel of the topic that can be read, and returns why the others cannot.
+/// Compiles a plan for every channel of the topic that can be read, and returns why the others cannot, and which are not read by
+/// their own definition.
 fn compile_targets(
     recording: &Recording,
     index: usize,
     request: &Request<'_>,
     wanted: &mut [BTreeMap<u16, Vec<Target>>],
-) -> Result<BTreeSet<String>, RecordingError> {
-    let mut unreadable = BTreeSet::new();
+) -> Result<[BTreeSet<String>; 2], RecordingError> {
+    let [mut unreadable, mut substituted] = [BTreeSet::new(), BTreeSet::new()];
     let mut readable = 0;
     for (file, wanted) in recording.files.iter().zip(wanted) {
         for (id, channel) in file.channels().filter(|(_, c)| c.topic == request.topic) {
             match compile_channel(channel, request) {
                 Ok((plan, to_m)) => {
                     readable += 1;
+                    substituted.extend(channel.substitution());
                     let cdr = *channel.message_encoding == *"cdr";
                     wanted.entry(id).or_default().push(Target { request: index, plan, to_m, cdr });
                 }
@@ -165,7 +174,7 @@ fn compile_targets(
         }
     }
     if readable > 0 {
-        return Ok(unreadable);
+        return Ok([unreadable, substituted]);
     }
     let (role, topic) = (request.role, request.topic.to_owned());
     if unreadable.is_empty() {

@@ -403,16 +403,13 @@ impl Reading<'_> {
         let of_all = format!("of {} poses rejected as occluded", r.messages);
         self.counted(note, Code::Occluded, r.occluded.total(), &of_all);
         self.counted(note, Code::OtherJoints, r.other_joints, "messages without all wanted joints skipped");
-        for why in &self.gathered.unreadable {
-            let text = format!("another channel of this topic is not read: {why}");
-            self.warnings.push(Warning::new(
-                note,
-                Stage::Recording,
-                Code::ChannelUnreadable,
-                warning_subject(&r),
-                text,
-            ));
-        }
+        let gathered = &self.gathered;
+        let unread = gathered.unreadable.iter().map(|why| {
+            (Code::ChannelUnreadable, format!("another channel of this topic is not read: {why}"))
+        });
+        let substituted = gathered.substituted.iter().map(|said| (Code::DefinitionSubstituted, said.clone()));
+        let said: Vec<(Code, String)> = unread.chain(substituted).collect();
+        said.into_iter().for_each(|(code, text)| self.say(note, code, text));
     }
 
     fn counted(&mut self, severity: Severity, code: Code, count: u64, what: &str) {

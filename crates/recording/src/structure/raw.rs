@@ -45,6 +45,16 @@ impl RawChannel {
     pub fn definition(&self) -> Option<&Arc<RawSchema>> {
         self.read_by.as_ref().map(|read_by| &read_by.schema).or(self.schema.as_ref())
     }
+
+    /// What is to be said where that is not its schema.
+    pub fn substitution(&self) -> Option<String> {
+        let ReadBy { schema, why } = &**self.read_by.as_ref()?;
+        let by = match &*schema.encoding {
+            "jsonschema" => "the fields that they have themselves",
+            _ => "the definition that armcal knows of this type, and those of another length are refused",
+        };
+        Some(format!("messages of {} are read by {by}: {why}", self.topic))
+    }
 }
 
 /// One message, its bytes borrowed.
