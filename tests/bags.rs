@@ -111,7 +111,7 @@ fn messages_longer_than_their_definition_are_refused() {
     let python = python_with("rosbags").expect("found before");
     let wrong = "import sqlite3, sys; d = sqlite3.connect(sys.argv[1]); \
                  d.execute(\"UPDATE message_definitions SET encoded_message_definition = \
-                 replace(encoded_message_definition, 'float64[] effort', '')\"); d.commit()";
+                 replace(encoded_message_definition, 'float64[] velocity', '')\"); d.commit()";
     let file = changed(&bags["db3"], &folder.path().join("wrong"), |_| ());
     let output = Command::new(python).args(["-c", wrong]).arg(&file).output().expect("python");
     assert!(output.status.success(), "{}", said(&output));

@@ -38,7 +38,7 @@ pub struct Proposal {
 
 /// A calibration that leaves less than this share of the nominal errors, or less than this [m], is of the arm that was recorded.
 const PLAUSIBLE_SHARE: f64 = 0.2;
-const PLAUSIBLE_M: f64 = 2e-3;
+const PLAUSIBLE_M: f64 = 4e-3;
 
 impl Proposal {
     /// Mean error that a first calibration leaves [m]; infinite where there was none.

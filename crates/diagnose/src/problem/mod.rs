@@ -12,7 +12,7 @@ pub use crate::problem::columns::Columns;
 use crate::problem::columns::Cut;
 use crate::problem::projection::{cholesky_upper, solve_cholesky};
 use armcal_core::{DwellId, Measured, Unit};
-use armcal_model::Toggle;
+use armcal_model::{EffectSpec, Toggle};
 use nalgebra::{DMatrix, DVector, Matrix3xX};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -157,6 +157,11 @@ pub struct Amplitude {
     pub typical: f64,
     /// Whether physics does not let it be negative.
     pub never_negative: bool,
+}
+
+/// Periods in a turn of a joint, of a periodic error.
+pub(crate) fn per_turn(spec: &EffectSpec) -> Option<f64> {
+    spec.shape.iter().find(|(name, _)| name == "frequency").map(|(_, frequency)| *frequency)
 }
 
 /// One effect on one target.

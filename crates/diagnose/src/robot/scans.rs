@@ -2,7 +2,7 @@
 
 use crate::DiagnoseError;
 use crate::enters::EntersAt;
-use crate::problem::{Candidate, Channel, Columns, Scan};
+use crate::problem::{Candidate, Channel, Columns, Scan, per_turn};
 use crate::robot::stretches::{running_sums, score_between, stretches};
 use crate::robot::view::View;
 use armcal_calibrate::Linearisation;
@@ -170,11 +170,6 @@ impl View<'_> {
         };
         Some(members.iter().map(at).collect())
     }
-}
-
-/// Periods in a turn of a joint, of a periodic error.
-pub(crate) fn per_turn(spec: &EffectSpec) -> Option<f64> {
-    spec.shape.iter().find(|(name, _)| name == "frequency").map(|(_, frequency)| *frequency)
 }
 
 /// Rows of each dwell.

@@ -5,10 +5,9 @@
 //! modulates a joint (a periodic error), the columns are kept as products.
 
 use crate::DiagnoseError;
-use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Part, Problem};
+use crate::problem::{Amplitude, Candidate, Columns, DwellRow, Part, Problem, per_turn};
 use crate::robot::group::{one_frequency, with_groups};
 use crate::robot::knowledge::Knowledge;
-use crate::robot::scans::per_turn;
 use armcal_calibrate::{FitConfig, LinearAxis, LinearPose, Linearisation, linearise, linearise_more};
 use armcal_core::Observation;
 use armcal_model::{EffectSpec, Model, PlacedEffect, Session, Since, Toggle};

@@ -23,6 +23,9 @@ const SPREAD_SHARE: f64 = 0.02;
 /// Where the two clocks differ, one whose steps are off by less than this share of the other's goes on evenly.
 const BLAMELESS: f64 = 0.1;
 
+/// A clock is set no more often in a recording.
+const MOST_STEPS: usize = 5;
+
 const A_SECOND_NS: i64 = 1_000_000_000;
 
 /// A stamp must be this many times the spread allowed away from its neighbours before it is called stray.
@@ -77,6 +80,21 @@ impl Stamps {
         let mut set: Vec<(i64, i64)> = set.collect();
         set.sort_by_key(|(_, log)| *log);
         set
+    }
+
+    /// Takes out the steps of a header clock that was set while log time went on evenly.
+    pub fn take_out_steps(&mut self) -> Vec<ClockStep> {
+        let mut steps = Vec::new();
+        while steps.len() < MOST_STEPS
+            && let Some(step) = find_clock_step(&self.in_log_order())
+        {
+            let by_ns = (step.by_s * 1e9).round() as i64;
+            let later =
+                self.header_ns.iter_mut().zip(&self.log_ns).filter(|(_, log)| **log >= step.from_log_ns);
+            later.for_each(|(header, _)| *header = header.map(|ns| ns - by_ns));
+            steps.push(step);
+        }
+        steps
     }
 
     /// How far the header's clock is ahead of log time, typically [s]; none where there is no header.
@@ -169,11 +187,6 @@ pub(crate) fn judge_header(stamps: &Stamps) -> Result<String, String> {
     }
     if repeated as f64 > REPEATED_SHARE * rows as f64 {
         return Err(format!("{repeated} of {rows} header stamps repeat the one before"));
-    }
-    if let Some(ClockStep { by_s, after_s }) = find_clock_step(&set) {
-        return Err(format!(
-            "header stamps step by {by_s:+.3} s against log time, {after_s:.1} s after the first row"
-        ));
     }
     judge_spread(&set)
 }

@@ -8,7 +8,7 @@ use crate::streams::occlusion::{Verdict, reject_frozen, reject_unseen};
 use crate::streams::poses;
 use crate::streams::publishers::find_other_publisher;
 use crate::streams::request::Request;
-use crate::streams::sensor_time::spread_bursts;
+use crate::streams::sensor_time::{ClockStep, spread_bursts};
 use crate::streams::temperature::{Scale, like_fahrenheit};
 use crate::{
     Chain, Clock, GaugeStream, JointStream, Occlusion, PoseStream, RecordingError, ScalarStream,
@@ -269,7 +269,8 @@ impl Reading<'_> {
     /// The time of each row on the clock asked for, or on the best one.
     fn time(&mut self, role: &'static str, asked: Option<Clock>) -> Result<Vec<Option<i64>>, RecordingError> {
         let mut stamps = std::mem::take(&mut self.gathered.stamps);
-        let (clock, why) = match asked {
+        let steps = if asked.is_none() { stamps.take_out_steps() } else { Vec::new() };
+        let (clock, mut why) = match asked {
             None => choose_clock(&stamps),
             Some(clock) => (clock, "set in the pipeline".to_owned()),
         };
@@ -298,6 +299,12 @@ impl Reading<'_> {
         };
         if let Some(doubt) = doubt {
             self.say(Severity::Notice, Code::HeaderClock, doubt);
+        }
+        for step in steps.iter().filter(|_| clock == Clock::Header).map(ClockStep::told) {
+            let taken_out =
+                "the clock was set, and the step is taken out; clock = \"log\" reads the other clock";
+            self.say(Severity::Notice, Code::HeaderClock, format!("{step}: {taken_out}"));
+            why += &format!("; {step}, taken out");
         }
         let ahead_of_log_s = stamps.ahead_of_log_s();
         let mut time = stamps.on(clock);

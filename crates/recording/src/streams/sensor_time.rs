@@ -30,6 +30,18 @@ pub(crate) struct ClockStep {
     pub by_s: f64,
     /// When, after the first row, by log time [s].
     pub after_s: f64,
+    /// Log time of the first row after it [ns].
+    pub from_log_ns: i64,
+}
+
+impl ClockStep {
+    /// For people.
+    pub fn told(&self) -> String {
+        format!(
+            "header stamps step by {:+.3} s against log time, {:.1} s after the first row",
+            self.by_s, self.after_s
+        )
+    }
 }
 
 /// The largest step of the header's clock against log time, from rows in log order; none where it is log time that steps.
@@ -61,8 +73,11 @@ pub(crate) fn find_clock_step(rows: &[(i64, i64)]) -> Option<ClockStep> {
             && (by_s - jump_s).abs() < 0.2 * by_s.abs();
         let of_header =
             (after(i, |r| r.0) - by_s).abs() < 0.5 * by_s.abs() && after(i, |r| r.1).abs() < 0.5 * by_s.abs();
-        (lasts && of_header)
-            .then(|| ClockStep { by_s, after_s: rows[i + 1].1.saturating_sub(rows[0].1) as f64 * 1e-9 })
+        (lasts && of_header).then(|| ClockStep {
+            by_s,
+            after_s: rows[i + 1].1.saturating_sub(rows[0].1) as f64 * 1e-9,
+            from_log_ns: rows[i + 1].1,
+        })
     };
     steps.iter().take(LOOKED_AT).find_map(lasting)
 }

@@ -28,7 +28,11 @@ fn recording(schema: (&'static str, &'static str, &'static [u8]), data: fn(u64) 
 fn joints() -> Streams {
     let names = vec!["a".into(), "b".into()];
     let joints = JointStream { topic: "/q".into(), names, ..JointStream::default() };
-    recording.read(&Streams { joints: vec![joints], ..Streams::default() }).map(|(samples, ..)| samples)
+    Streams { joints: vec![joints], ..Streams::default() }
+}
+
+fn read(recording: &Recording) -> Result<Samples, RecordingError> {
+    recording.read(&joints()).map(|(samples, ..)| samples)
 }
 
 fn notices(recording: &Recording, streams: &Streams) -> Vec<String> {

@@ -3,8 +3,7 @@
 //! Rarer than a sign or an order: tried where none of those explains the errors.
 
 use super::joints::{scale_reading, scaled_readings, shift_reading};
-use super::model::{WIDER, widen_bounds};
-use super::zeros::zero_names;
+use super::model::{WIDER, widen_bounds, zero_names};
 use super::{Estimated, Freedom, Hypothesis, Mending};
 use armcal_core::units::DEGREES;
 use armcal_core::{Code, Parameter, Unit};

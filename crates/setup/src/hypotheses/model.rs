@@ -206,6 +206,12 @@ fn columns_exchanged(parameters: &[Parameter]) -> Vec<Change> {
     parameters.iter().filter_map(other).collect()
 }
 
+/// The parameters that are the zeros of joints.
+pub fn zero_names(inputs: &Inputs) -> Vec<String> {
+    let joints = 0..inputs.chain.joint_names().len();
+    joints.filter_map(|j| inputs.chain.joint_zero(j)).map(|(p, _)| p.name.clone()).collect()
+}
+
 /// A parameter let go far beyond its bounds.
 pub fn widen_bounds(name: &str) -> Change {
     Change::widened(name, WIDER)

@@ -4,7 +4,7 @@
 
 use super::drives::{bounded_amplitude, effect_hypothesis};
 use super::joints::{SIGN, ZERO, scale_reading, shift_reading};
-use super::model::widen_bounds;
+use super::model::{widen_bounds, zero_names};
 use super::parts::recording_ranges;
 use super::{Estimated, Freedom, Hypothesis, Mending};
 use armcal_core::{Code, DwellId, Mend, Parameter, Unit};
@@ -160,10 +160,4 @@ fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
         let hypothesis = Hypothesis::new(Code::JointZero, "all joints", change, ZERO, widen);
         Hypothesis { mending, ..hypothesis }.estimating(Freedom::Number, far)
     })
-}
-
-/// The parameters that are the zeros of joints.
-pub fn zero_names(inputs: &Inputs) -> Vec<String> {
-    let joints = 0..inputs.chain.joint_names().len();
-    joints.filter_map(|j| inputs.chain.joint_zero(j)).map(|(p, _)| p.name.clone()).collect()
 }
