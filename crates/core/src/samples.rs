@@ -64,6 +64,8 @@ impl PoseSamples {
 
     /// Stamps of a clock that runs so many times as fast as time, on one that does not; the first stays.
     pub fn slow_down(&mut self, rate: f64) {
+        // How far ahead the clock was, was of what it no longer is.
+        self.ahead_of_log_s = None;
         let first = self.time_ns.first().copied().unwrap_or_default();
         self.time_ns.iter_mut().for_each(|t| *t = first + ((*t - first) as f64 / rate).round() as i64);
     }

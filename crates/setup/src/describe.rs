@@ -170,7 +170,9 @@ pub fn scale_with_interval(mended: &Inputs, h: &Hypothesis) -> Option<String> {
     let axes: Vec<(f64, f64)> =
         fitted.calibration.fit.estimates.iter().filter(own).map(|e| (e.value, e.sigma)).collect();
     let mean = |of: fn(&(f64, f64)) -> f64| axes.iter().map(of).sum::<f64>() / axes.len() as f64;
-    let (scale, sigma) = (near / (1.0 + mean(|axis| axis.0)), near * mean(|axis| axis.1));
+    let scale = near / (1.0 + mean(|axis| axis.0));
+    // What is taken of the arm moves it more than noise does: by how far the two ways to estimate it differ.
+    let sigma = (near * mean(|axis| axis.1)).hypot(scale - near);
     let ends = scale.is_finite() && sigma.is_finite();
     ends.then(|| format!(" (estimated beside the arm: {scale:.4} ± {sigma:.4})"))
 }

@@ -200,21 +200,30 @@ fn judge_spread(set: &[(i64, i64)]) -> Result<String, String> {
     let mut latency_s: Vec<f64> = set.iter().map(|(h, log)| log.saturating_sub(*h) as f64 * 1e-9).collect();
     let spread_s = percentile_in(&mut latency_s, 0.99) - percentile_in(&mut latency_s, 0.01);
     if spread_s > SPREAD_S.max(SPREAD_SHARE * duration_s) {
-        if log_is_to_blame(set) {
+        let rate = clock_rate(set, duration_s);
+        if rate.is_none() && log_is_to_blame(set) {
             return Ok(format!(
                 "header stamps are set and evenly spaced; log time is not, it lags by up to {spread_s:.1} s as that of a \
                  recorder that stalls"
             ));
         }
-        let rate = match span_s(set.first().map(|s| s.0), set.last().map(|s| s.0)) / duration_s {
-            rate if (rate - 1.0).abs() > SPREAD_SHARE => {
-                format!(": their clock runs {rate:.4} times as fast")
-            }
-            _ => String::new(),
-        };
+        let rate = rate.map_or(String::new(), |rate| format!(": their clock runs {rate:.4} times as fast"));
         return Err(format!("header stamps wander {spread_s:.3} s against log time{rate}"));
     }
     Ok(format!("header stamps are set, increase, and follow log time within {:.1} ms", spread_s * 1e3))
+}
+
+/// How many times as fast as log time the header's clock runs, where it is another rate from row to row and over all.
+fn clock_rate(set: &[(i64, i64)], duration_s: f64) -> Option<f64> {
+    let steps = |stamp: fn(&(i64, i64)) -> i64| {
+        let all: Vec<f64> = set.windows(2).map(|w| span_s(Some(stamp(&w[0])), Some(stamp(&w[1])))).collect();
+        percentile(&all, 0.5)
+    };
+    let over_all = span_s(set.first().map(|s| s.0), set.last().map(|s| s.0)) / duration_s;
+    let by_row = steps(|s| s.0) / steps(|s| s.1);
+    let off = [over_all - 1.0, by_row - 1.0];
+    let alike = (off[0] - off[1]).abs() < 0.5 * off[0].abs();
+    (off[0].abs() > SPREAD_SHARE && alike).then_some(over_all)
 }
 
 /// Whether, where the two clocks differ from row to row, the header goes on evenly and log time does not.

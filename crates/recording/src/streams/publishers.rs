@@ -65,12 +65,15 @@ pub(crate) fn find_other_publisher(
         let far = |track: &Option<Track>| track.as_ref().map(|t| distance(&t.last, &here));
         let (first, second) = (far(&tracks[0]), far(&tracks[1]));
         leaps += usize::from(first.into_iter().chain(second).fold(f64::INFINITY, f64::min) > apart);
+        let furthest = first.into_iter().chain(second).fold(0.0, f64::max);
         let second = match (first, second) {
             (Some(first), None) => first > apart,
             (Some(first), Some(second)) => second < first,
             (None, _) => false,
         };
-        changes += usize::from(of_second.last().is_some_and(|before| *before != second));
+        // Where the tracks meet, either may go on.
+        let apart_here = furthest > apart;
+        changes += usize::from(apart_here && of_second.last().is_some_and(|before| *before != second));
         of_second.push(second);
         match &mut tracks[usize::from(second)] {
             Some(track) => track.take(&here),
