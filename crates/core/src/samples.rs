@@ -35,6 +35,9 @@ impl JointSamples {
     }
 }
 
+/// Clocks that are further apart by log time are of other epochs [s].
+const EPOCH_S: f64 = 1.0;
+
 /// Below this many rows a second, movements are lost between them.
 pub const FEW_PER_S: f64 = 4.0;
 
@@ -73,6 +76,11 @@ impl PoseSamples {
     /// How far its clock is ahead of that of the joints, if messages of both were logged as soon as they were stamped [s].
     pub fn clock_ahead_s(&self, joints: &JointSamples) -> Option<f64> {
         Some(self.ahead_of_log_s? - joints.ahead_of_log_s?)
+    }
+
+    /// The same where the clocks are of other epochs; 0 of clocks that are near each other.
+    pub fn other_epoch_s(&self, joints: &JointSamples) -> f64 {
+        self.clock_ahead_s(joints).filter(|s| s.abs() > EPOCH_S).unwrap_or(0.0)
     }
 
     /// Number of rows.

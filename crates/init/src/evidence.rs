@@ -140,7 +140,7 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
         let alike = |at: usize| {
             let seen = recording.body(at).filter(|seen| median_and_travel_m(seen).1 > STANDS_M)?;
             // Clocks of other epochs are compared by log time.
-            let ahead_s = seen.clock_ahead_s(joints).filter(|s| s.abs() > EPOCH_S).unwrap_or(0.0);
+            let ahead_s = seen.other_epoch_s(joints);
             let on_robot: Vec<i64> = seen.time_ns.iter().map(|t| t - (ahead_s * 1e9) as i64).collect();
             let found = compare_speeds(&speeds, &Speeds::of(&on_robot, |i| seen.position_m[i]))?;
             Some(Likeness { delay_s: found.delay_s + ahead_s, ..found })
@@ -158,9 +158,6 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
     }
     all
 }
-
-/// Clocks that are further apart by log time are of other epochs [s].
-const EPOCH_S: f64 = 1.0;
 
 /// The clock of a body that moves with the arm only if its stamps ran so many times as fast; by its number.
 pub fn clock_rates(arm: &Arm, read: &AllRead, evidence: &[Evidence]) -> Vec<(usize, f64)> {

@@ -152,8 +152,9 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
     progress.step("comparing motions");
     let board = asked.board.as_deref().map(read_board).transpose()?;
     let mut evidence = evidence::gather(&arm, &read);
-    for (body, rate) in evidence::clock_rates(&arm, &read, &evidence) {
-        read.set_clock_rate(body, rate);
+    let rates = evidence::clock_rates(&arm, &read, &evidence);
+    if !rates.is_empty() {
+        rates.into_iter().for_each(|(body, rate)| read.set_clock_rate(body, rate));
         evidence = evidence::gather(&arm, &read);
     }
     let (cast, seats) = roles::assign_roles(&arm, &evidence, board.as_ref(), taken.at_end);

@@ -20,9 +20,6 @@ use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Clocks that are further apart by log time are of other epochs [s].
-const EPOCH_S: f64 = 1.0;
-
 /// Two recordings that hold the same readings over some time.
 pub struct Repeat {
     /// The earlier one in the pipeline.
@@ -215,7 +212,7 @@ fn alignment_feature<'s>(samples: &'s Samples, model: &Model) -> Option<(Feature
 
 /// One pose a stop shows no motion: its clock is that of the joints, but for what log time tells of their epochs.
 fn clock_of_stops(joints: &JointSamples, tip: &PoseSamples) -> (ClockAlignment, Vec<Warning>) {
-    let offset_s = tip.clock_ahead_s(joints).filter(|s| s.abs() > EPOCH_S).unwrap_or(0.0);
+    let offset_s = tip.other_epoch_s(joints);
     let clock = ClockAlignment {
         offset_s,
         offset_sigma_s: 0.0,

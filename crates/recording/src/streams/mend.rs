@@ -210,9 +210,9 @@ impl Streams {
             Mend::Order(_) => (format!("`names = {:?}`", mended.joints[0].names), "[streams.joints]"),
             Mend::Axes(matrix) | Mend::AxesOfArm(matrix) => {
                 let words = axes_of(matrix)?.map(Axis::word);
-                (format!("`axes = {words:?}`"), self.sections_of(mend))
+                (format!("`axes = {words:?}`"), mended.sections_of(mend))
             }
-            Mend::Inverted | Mend::TipInverted => ("`invert = true`".to_owned(), self.sections_of(mend)),
+            Mend::Inverted | Mend::TipInverted => ("`invert = true`".to_owned(), mended.sections_of(mend)),
         };
         Some(format!("{key} under {of}"))
     }
@@ -232,9 +232,8 @@ impl Streams {
         self.tip.iter_mut().chain(moving).chain(still).collect()
     }
 
-    fn sections_of(&self, mend: &Mend) -> &'static str {
-        let mut own = self.clone();
-        match own.bodies_of(mend).len() {
+    fn sections_of(&mut self, mend: &Mend) -> &'static str {
+        match self.bodies_of(mend).len() {
             1 if self.tip.is_some() => "[streams.tip]",
             _ => "each body of [streams]",
         }

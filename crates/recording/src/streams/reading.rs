@@ -306,10 +306,11 @@ impl Reading<'_> {
             self.say(Severity::Notice, Code::HeaderClock, format!("{step}: {taken_out}"));
             why += &format!("; {step}, taken out");
         }
-        let ahead_of_log_s = stamps.ahead_of_log_s();
+        if clock == Clock::Header {
+            self.ahead_of_log_s = stamps.ahead_of_log_s();
+        }
         let mut time = stamps.on(clock);
         if clock == Clock::Header {
-            self.ahead_of_log_s = ahead_of_log_s;
             self.report.stray_stamps = drop_stray(&mut time, &stamps.log_ns);
         }
         (self.report.clock, self.report.clock_reason) = (clock, why);
