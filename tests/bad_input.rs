@@ -231,7 +231,7 @@ fn what_is_no_pipeline_is_named_for_what_it_is() {
     for (file, says) in [
         ("normal.mcap", "normal.mcap is a recording (MCAP), where a pipeline belongs"),
         ("normal.mcap", "armcal inspect normal.mcap"),
-        ("old.bag", "old.bag is a ROS 1 bag, where a pipeline belongs: convert it with `mcap convert"),
+        ("old.bag", "old.bag is a ROS 1 bag, where a pipeline belongs: name it under [[recordings]]"),
         ("new.db3", "new.db3 is a rosbag2 database, where a pipeline belongs: name it under [[recordings]]"),
         ("plain", "plain is a folder, where a pipeline belongs"),
         ("odd.toml", "reading the pipeline odd.toml: it is not UTF-8 text"),

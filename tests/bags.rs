@@ -12,7 +12,9 @@ fn bags(folder: &Path) -> Option<BTreeMap<&'static str, PathBuf>> {
     let output = Command::new(python).args([&script, folder, &fixture]).output().expect("python");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let forms = ["mcap", "db3", "file", "message", "mcap-file", "mcap-message", "old", "split"];
-    Some(forms.map(|form| (form, folder.join(form).join("normal"))).into())
+    let ros1 = ["ros1", "ros1-bz2", "ros1-lz4"];
+    let all = forms.map(|form| (form, folder.join(form).join("normal"))).into_iter();
+    Some(all.chain(ros1.map(|form| (form, folder.join(form).join("normal.bag")))).collect())
 }
 
 fn said(output: &std::process::Output) -> String {
@@ -21,8 +23,9 @@ fn said(output: &std::process::Output) -> String {
 
 /// A copy of a bag's one file, as a change leaves it.
 fn changed(bag: &Path, to: &Path, change: impl FnOnce(&mut Vec<u8>)) -> PathBuf {
-    let file = std::fs::read_dir(bag).expect("a bag").flatten().map(|e| e.path());
-    let file = file.into_iter().find(|p| p.extension().is_none_or(|e| e != "yaml")).expect("a file");
+    let inside = std::fs::read_dir(bag).into_iter().flatten().flatten().map(|e| e.path());
+    let file = inside.into_iter().find(|p| p.extension().is_none_or(|e| e != "yaml"));
+    let file = file.unwrap_or_else(|| bag.to_owned());
     let mut bytes = std::fs::read(&file).expect("readable");
     change(&mut bytes);
     std::fs::create_dir_all(to).expect("a folder");
@@ -40,7 +43,8 @@ fn every_form_of_a_bag_gives_the_same_calibration() {
     let mut expected: Option<Value> = None;
     for (form, bag) in &bags {
         let names = || -> Vec<_> {
-            std::fs::read_dir(bag).expect("a bag").flatten().map(|e| e.file_name()).collect()
+            let folder = if bag.is_dir() { bag } else { bag.parent().expect("a folder") };
+            std::fs::read_dir(folder).expect("a bag").flatten().map(|e| e.file_name()).collect()
         };
         let before = names();
         let paths = format!("[\"{}\"]", bag.display());
@@ -55,6 +59,11 @@ fn every_form_of_a_bag_gives_the_same_calibration() {
         assert_eq!(&fit, expected.get_or_insert(fit.clone()), "{form}");
         assert_eq!(names(), before, "{form}: nothing is written beside it");
     }
+}
+
+fn flip_middle(bytes: &mut [u8]) {
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
 }
 
 /// Of a database that is cut off, shorn of its definitions, or of other messages than it says: counted, told, no panic.
@@ -78,6 +87,9 @@ fn damaged_bags_end_in_words() {
         (cut(&bags["mcap-file"], "cut-mcap", 0.6), Some(3), "cut off"),
         (cut(&bags["db3"], "head", 0.0001), Some(1), "cannot be read"),
         (changed(&bags["db3"], &at("other"), |bytes| bytes.truncate(16)), Some(1), "not a database"),
+        (cut(&bags["ros1"], "cut-ros1", 0.6), Some(3), "cut off"),
+        (cut(&bags["ros1-bz2"], "cut-bz2", 0.99), Some(3), "chunks"),
+        (changed(&bags["ros1-bz2"], &at("flip-bz2"), |b| flip_middle(b)), Some(3), "does not inflate"),
     ];
     for (file, code, words) in cases {
         let (got, said) = inspect(&file);
@@ -91,8 +103,8 @@ fn damaged_bags_end_in_words() {
         assert!(got == code && said.contains(words), "{}: {got:?} {said}", file.display());
     }
     // Bytes gone bad anywhere: an answer each time.
-    for k in 0..40_usize {
-        let file = changed(&bags["db3"], &at("flipped"), |bytes| {
+    for (k, form) in (0..80_usize).map(|k| (k, ["db3", "ros1", "ros1-lz4", "ros1-bz2"][k % 4])) {
+        let file = changed(&bags[form], &at("flipped"), |bytes| {
             for i in 0..20 {
                 let place = (k * 7919 + i * 104_729) * 31 % bytes.len();
                 bytes[if k % 3 == 0 { place % 8192 } else { place }] ^= 1 << (i % 8);

@@ -201,7 +201,7 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
         std::fs::write(&path, bytes).expect("a file");
         path
     };
-    let ros1 = file("a.bag", b"#ROSBAG V2.0\n");
+    let ros1 = file("a.bag", b"#ROSBAG V1.2\n");
     let database = file("b.db3", b"SQLite format 3\0");
     let unnamed = file("f.sqlite", b"SQLite format 3\0");
     let packed = file("c.mcap.zstd", &[0x28, 0xb5, 0x2f, 0xfd, 0, 0]);
@@ -227,7 +227,7 @@ fn what_cannot_be_proposed_is_refused_in_words_and_leaves_nothing() {
     let no_xml = file("no.urdf", b"<robot><link");
     let option = Path::new;
     let cases: Vec<(Vec<&Path>, i32, Vec<&str>)> = vec![
-        (vec![&ros1], 1, vec!["ROS 1 bag", "mcap convert"]),
+        (vec![&ros1], 1, vec!["ROS 1 bag", "rosbag fix"]),
         (vec![&database], 1, vec!["b.db3", "SQLite database that cannot be read"]),
         (vec![&packed], 1, vec!["c.mcap.zstd", "compressed", "cut off"]),
         (vec![&unnamed], 1, vec!["f.sqlite", "database", ".db3: rename"]),

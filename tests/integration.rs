@@ -39,8 +39,11 @@ mod symptoms;
 /// Does every shipped pipeline run, from a clone or with the data that it names?
 mod shipped_pipelines;
 
-/// Are rosbag2's databases and compressed recordings read as they are, to the same numbers as MCAP?
+/// Are databases of rosbag2, bags of ROS 1 and compressed recordings read as they are, to the same numbers as MCAP?
 mod bags;
+
+/// Do the tables that labs publish end in the calibration of their session, whatever their form?
+mod tables;
 
 /// Does every command say so where a recording that it reads has lost data, and is nothing reused that was made of less?
 mod damaged_inputs;

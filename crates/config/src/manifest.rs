@@ -3,7 +3,7 @@
 use super::pattern::matching_paths;
 use crate::{ConfigError, RecordingEntry};
 use armcal_recording::{
-    input, is_recording, is_url, list_objects, recordings_at, resolve_path, without_ending,
+    input, is_recording, is_table, is_url, list_objects, recordings_at, resolve_path, without_ending,
 };
 use armcal_table::Tilt;
 use serde::Deserialize;
@@ -123,7 +123,7 @@ impl Manifest {
 
 /// Anything but a recording, a folder or a pattern.
 fn is_manifest(path: &Path) -> bool {
-    path.is_file() && !is_recording(path)
+    path.is_file() && !is_recording(path) && !is_table(path)
 }
 
 /// The recordings in a folder, and those of the rosbag2 folders in it; of anything else itself. A folder that cannot be looked

@@ -18,17 +18,8 @@ pub fn read_text(what: &'static str, kind: Kind, path: &Path) -> Result<String, 
     let (mut bytes, mut file) = (Vec::new(), input::open(path).map_err(failed)?);
     file.by_ref().take(16).read_to_end(&mut bytes).map_err(failed)?;
     match bytes.as_slice() {
-        b if b.starts_with(b"\x89MCAP") => is(
-            "a recording (MCAP)",
-            format!(
-                "{own}, or have one proposed: `armcal init {shown}`; `armcal inspect {shown}` shows what is in it"
-            ),
-        ),
-        b if b.starts_with(b"#ROSBAG") => {
-            is("a ROS 1 bag", format!("convert it with `mcap convert in.bag out.mcap`, {own}"))
-        }
-        b if b.starts_with(b"SQLite format 3") => is(
-            "a rosbag2 database",
+        b if let Some(what) = recording_kind(b) => is(
+            what,
             format!(
                 "{own}, or have one proposed: `armcal init {shown}`; `armcal inspect {shown}` shows what is in it"
             ),
@@ -39,4 +30,14 @@ pub fn read_text(what: &'static str, kind: Kind, path: &Path) -> Result<String, 
             text.map_err(|_| failed(std::io::Error::other("it is not UTF-8 text")))
         }
     }
+}
+
+/// What kind of recording begins so.
+fn recording_kind(head: &[u8]) -> Option<&'static str> {
+    let kinds: [(&[u8], &str); 3] = [
+        (b"\x89MCAP", "a recording (MCAP)"),
+        (b"#ROSBAG", "a ROS 1 bag"),
+        (b"SQLite format 3", "a rosbag2 database"),
+    ];
+    kinds.into_iter().find(|(magic, _)| head.starts_with(magic)).map(|(_, what)| what)
 }

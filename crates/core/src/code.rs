@@ -37,6 +37,8 @@ codes! {
     RecordingDamaged = "recording-damaged",
     /// Something about a recording's file is not as it should be, and nothing is missing for it.
     RecordingIrregular = "recording-irregular",
+    /// What a table that is read as a recording does not say, and what is assumed of it.
+    TableRead = "table-read",
     /// Messages are read by another definition than the one that the file has of them, if it has any.
     DefinitionSubstituted = "definition-substituted",
     /// A recording of which no dwell became an observation is left out.

@@ -32,7 +32,7 @@ pub use error_stats::ErrorStats;
 pub use feature::FeatureId;
 pub use frames::{Pose, RollPitchYaw};
 pub use mark::{DwellMark, hash_of};
-pub use mend::Mend;
+pub use mend::{Mend, axis_turns, in_axes};
 pub use observation::{Load, Measured, Observation, Rejection};
 pub use parameter::{Parameter, ParameterKind, Role};
 pub use printable::printable_name;

@@ -1,6 +1,6 @@
 //! What undoes a mistake of the setup where the recordings are read.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, UnitQuaternion};
 
 /// Keys under `[streams]` of a pipeline that undo a mistake.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,10 +18,32 @@ pub enum Mend {
     Axes(Matrix3<f64>),
     /// The same of the body at the tip and of markers on the arm alone.
     AxesOfArm(Matrix3<f64>),
+    /// Positions of all bodies so many times as large.
+    Scale(f64),
+    /// Orientations of the body at the tip and of markers on the arm in other axes than their positions.
+    OrientationAxes(Matrix3<f64>),
     /// Poses of all bodies are those of the sensor in the body.
     Inverted,
     /// The same of the body at the tip alone.
     TipInverted,
+}
+
+/// The turns that carry axes onto axes: 24, the first of them none.
+pub fn axis_turns() -> Vec<Matrix3<f64>> {
+    let orders = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]];
+    let signed = |order: [usize; 3], signs: usize| {
+        Matrix3::from_fn(|row, column| {
+            let sign = if signs >> row & 1 == 0 { 1.0 } else { -1.0 };
+            if order[row] == column { sign } else { 0.0 }
+        })
+    };
+    let all = orders.into_iter().flat_map(|order| (0..8).map(move |signs| signed(order, signs)));
+    all.filter(|turn| turn.determinant() > 0.0).collect()
+}
+
+/// A rotation as it is in axes that a matrix, a turn or a reflection, carries these onto.
+pub fn in_axes(matrix: &Matrix3<f64>, rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_matrix(&(matrix * rotation.to_rotation_matrix().matrix() * matrix.transpose()))
 }
 
 impl Mend {

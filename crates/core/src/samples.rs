@@ -40,6 +40,8 @@ const EPOCH_S: f64 = 1.0;
 
 /// Below this many rows a second, movements are lost between them.
 pub const FEW_PER_S: f64 = 4.0;
+/// Below this many no clock can be told from them: most moves have no row.
+const NO_MOTION_PER_S: f64 = 1.0;
 
 /// Poses of one tracked body in the frame of its sensor. Occluded frames are already removed.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -61,8 +63,17 @@ pub struct PoseSamples {
 impl PoseSamples {
     /// Whether it has fewer rows than show how a body moves: one pose a stop, as of a camera that is triggered.
     pub fn is_one_a_stop(&self) -> bool {
+        self.len() > 1 && self.rows_per_s() < FEW_PER_S
+    }
+
+    /// Whether moves go by between its rows, so that they show no clock.
+    pub fn shows_no_motion(&self) -> bool {
+        self.len() > 1 && self.rows_per_s() < NO_MOTION_PER_S
+    }
+
+    fn rows_per_s(&self) -> f64 {
         let span_ns = self.time_ns.last().zip(self.time_ns.first()).map_or(0, |(last, first)| last - first);
-        self.len() > 1 && (self.len() - 1) as f64 / (span_ns as f64 * 1e-9) < FEW_PER_S
+        (self.len() - 1) as f64 / (span_ns as f64 * 1e-9)
     }
 
     /// Stamps of a clock that runs so many times as fast as time, on one that does not; the first stays.
@@ -81,6 +92,16 @@ impl PoseSamples {
     /// The same where the clocks are of other epochs; 0 of clocks that are near each other.
     pub fn other_epoch_s(&self, joints: &JointSamples) -> f64 {
         self.clock_ahead_s(joints).filter(|s| s.abs() > EPOCH_S).unwrap_or(0.0)
+    }
+
+    /// How much later it begins than the joints do [s], where the two never overlap: made on two computers whose clocks nobody set;
+    /// 0 of streams that overlap.
+    pub fn apart_s(&self, joints: &JointSamples) -> f64 {
+        let ends = |time_ns: &[i64]| Some((*time_ns.first()?, *time_ns.last()?));
+        match ends(&self.time_ns).zip(ends(&joints.time_ns)) {
+            Some((own, of)) if own.1 < of.0 || of.1 < own.0 => own.0.saturating_sub(of.0) as f64 * 1e-9,
+            _ => 0.0,
+        }
     }
 
     /// Number of rows.

@@ -19,6 +19,8 @@ pub struct ClockAlignment {
     /// Sensor time at which the offset holds [ns], chosen so that the errors of offset and drift are
     /// uncorrelated (where that time lies inside the recording).
     pub reference_ns: i64,
+    /// The sensor's first stamp [ns].
+    pub first_ns: i64,
     /// Correlation of the two speed profiles after alignment, 0 to 1; NaN where they could not be compared.
     pub correlation: f64,
     /// Median ratio of measured to predicted distances between positions of the tip; 1 up to a few percent
@@ -40,6 +42,12 @@ impl ClockAlignment {
         self.offset_sigma_s.hypot(self.drift_sigma * self.since_reference_s(sensor_ns))
     }
 
+    /// Offset at the sensor's first stamp and its standard error [s]: what a pipeline declares, and what is shown.
+    pub fn first_offset_s(&self) -> [f64; 2] {
+        let since_s = self.since_reference_s(self.first_ns);
+        [self.offset_s + self.drift * since_s, self.sigma_s(self.first_ns)]
+    }
+
     fn since_reference_s(&self, sensor_ns: i64) -> f64 {
         crate::series::seconds_between(self.reference_ns, sensor_ns)
     }
@@ -56,6 +64,7 @@ mod tests {
             drift: 1e-5,
             drift_sigma: 4e-6,
             reference_ns: 1_000_000_000,
+            first_ns: -99_000_000_000,
             correlation: 1.0,
             displacement_ratio: 1.0,
             declared: false,
@@ -74,6 +83,13 @@ mod tests {
         let a = alignment();
         assert!((a.sigma_s(a.reference_ns) - 3e-4).abs() < 1e-15);
         assert!((a.sigma_s(a.reference_ns + 100_000_000_000) - 5e-4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_shown_is_the_offset_at_the_first_stamp() {
+        let [offset_s, sigma_s] = alignment().first_offset_s();
+        assert!((offset_s - (0.25 - 100.0 * 1e-5)).abs() < 1e-12);
+        assert!((sigma_s - 5e-4).abs() < 1e-12);
     }
 
     #[test]

@@ -253,6 +253,7 @@ fn the_tip_is_measured_on_its_own_clock() {
             drift: 0.0,
             drift_sigma: 0.0,
             reference_ns: ns(0.0),
+            first_ns: ns(0.0),
             correlation: 1.0,
             displacement_ratio: 1.0,
             declared: false,

@@ -17,6 +17,7 @@ fn recorded(seed: u64, offset_s: f64) -> (Session, Samples, ClockAlignment) {
         drift: 0.0,
         drift_sigma: 0.0,
         reference_ns: ns(0.0),
+        first_ns: ns(0.0),
         correlation: 1.0,
         displacement_ratio: 1.0,
         declared: false,

@@ -1,14 +1,16 @@
 //! The nominal arm: which of its joints are recorded, from which link to which.
 
 use super::channels::{Channels, Unknown};
+use super::links::{Link, joint_depths, joints_of, link_path, rigid_with};
 use super::missing::no_joints;
+use super::telescope::{self, Telescope};
 use super::topics::{Field, JointTopic};
 use crate::error::InitError;
 use armcal_core::Pose;
 use armcal_model::{Chain, Model, check_xml};
 use armcal_recording::input::Kind;
 use armcal_stages::frames::bare_model;
-use roxmltree::{Document, Node};
+use roxmltree::Document;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -200,7 +202,15 @@ fn resolve_arm(
         return from_dh(told, channels, path);
     }
     let (file, text, recorded) = urdf_of(told, channels, folders, beside)?;
-    from_urdf(told, channels, file, text, recorded)
+    let named = candidate_topics(told, channels).flat_map(|j| &j.names).map(String::as_str).collect();
+    match telescope::follow_sum(&text, &named) {
+        Some(Telescope { text, said }) => {
+            let mut arm = from_urdf(told, channels, beside.to_owned(), text, true)?;
+            arm.unsure.push(said);
+            Ok(arm)
+        }
+        None => from_urdf(told, channels, file, text, recorded),
+    }
 }
 
 /// File and text of the URDF, and whether it was recorded.
@@ -354,14 +364,6 @@ fn topic_of(told: &Told, channels: &Channels, joints: &[String]) -> Option<(Join
     found.map(|j| (j.of_joints(joints), joints.to_vec()))
 }
 
-/// A joint of a URDF.
-struct Link<'a> {
-    joint: &'a str,
-    moves: bool,
-    slides: bool,
-    parent: &'a str,
-}
-
 fn from_urdf(
     told: &Told,
     channels: &Channels,
@@ -420,8 +422,6 @@ fn from_urdf(
         return Err(bad(format!("no recorded joint leads to {end}")));
     }
     let model_joints: Vec<String> = moving.iter().map(|link| joints[link].joint.to_owned()).collect();
-    let (source, names) = topic_of(told, channels, &model_joints)
-        .ok_or_else(|| other_joints(channels, &model_joints, &file))?;
     let first = way[behind];
     let above = joints[first].parent;
     let is_frame_alone = behind == 0 && NO_ROBOT.contains(&above) && !joints[first].moves;
@@ -432,17 +432,28 @@ fn from_urdf(
         None => rigid_with(&joints, end),
     };
     let chain = Chain::from_urdf(&text, &base_link, tips.first().map_or(end, String::as_str), &file)?;
-    if chain.joint_names() != model_joints {
+    // What the way's joints follow may be elsewhere in the robot.
+    let led_link = |name: &String| way.iter().rev().find(|link| joints[*link].leader == Some(name));
+    let own_link =
+        |name: &String| moving.iter().find(|link| joints[*link].joint == name).or_else(|| led_link(name));
+    let carried: Vec<Option<&&str>> = chain.joint_names().iter().map(own_link).collect();
+    if carried.contains(&None) || !model_joints.iter().all(|name| chain.joint_names().contains(name)) {
         let own = chain.joint_names().join(", ");
         return Err(bad(format!(
             "from {base_link} on the way to {end} there are the joints {own}, recorded are {}",
             model_joints.join(", ")
         )));
     }
+    // As they lie behind each other, whatever the order of the joints.
+    let moved: BTreeSet<&str> = carried.into_iter().flatten().copied().collect();
+    let carried: Vec<String> =
+        way.iter().filter(|link| moved.contains(*link)).map(|link| (*link).to_owned()).collect();
+    let model_joints = chain.joint_names().to_vec();
+    let (source, names) = topic_of(told, channels, &model_joints)
+        .ok_or_else(|| other_joints(channels, &model_joints, &file))?;
     let model = bare_model(&chain, Vec::new())?;
     let mut links: BTreeSet<String> = joints.keys().map(|link| (*link).to_owned()).collect();
     links.extend(joints.values().map(|l| l.parent.to_owned()));
-    let carried = moving.iter().map(|link| (*link).to_owned()).collect();
     let mut unsure = other_topic_notes(told, channels, &source.topic, &names);
     if deepest < whole && told.tip_link.is_none() {
         unsure.push(left_out_note(&source, &joints, end, &model_joints));
@@ -486,76 +497,6 @@ fn left_out_note(
         read.len(),
         read.join(", ")
     )
-}
-
-/// Every joint by the link that it carries.
-fn joints_of<'a>(robot: Node<'a, '_>) -> BTreeMap<&'a str, Link<'a>> {
-    let child = |joint: Node<'a, '_>, tag: &str| {
-        let found = joint.children().find(|c| c.has_tag_name(tag))?;
-        found.attribute("link")
-    };
-    let joint = |joint: Node<'a, '_>| {
-        let form = joint.attribute("type")?;
-        let mimics = joint.children().any(|c| c.has_tag_name("mimic"));
-        let moves = ["revolute", "continuous", "prismatic"].contains(&form) && !mimics;
-        let (parent, link) = (child(joint, "parent")?, child(joint, "child")?);
-        Some((link, Link { joint: joint.attribute("name")?, moves, slides: form == "prismatic", parent }))
-    };
-    robot.children().filter(|c| c.has_tag_name("joint")).filter_map(joint).collect()
-}
-
-/// The links from behind the root to this one.
-fn link_path<'a>(joints: &BTreeMap<&'a str, Link<'a>>, link: &str) -> Vec<&'a str> {
-    let mut way: Vec<&str> = Vec::new();
-    let mut at = link;
-    while let Some((link, joint)) = joints.get_key_value(at).filter(|_| way.len() <= joints.len()) {
-        way.push(link);
-        at = joint.parent;
-    }
-    way.reverse();
-    way
-}
-
-/// How many joints that count lead from the root to each link, itself included: each is asked once, however they hang together.
-fn joint_depths<'a>(
-    joints: &BTreeMap<&'a str, Link<'a>>,
-    counts: impl Fn(&Link<'_>) -> bool,
-) -> BTreeMap<&'a str, usize> {
-    let mut depths: BTreeMap<&str, usize> = BTreeMap::new();
-    for link in joints.keys() {
-        let (mut way, mut at) = (Vec::new(), *link);
-        // Joints that form a loop have no root: each of them begins at zero.
-        while let Some((link, joint)) =
-            joints.get_key_value(at).filter(|(link, _)| !depths.contains_key(*link))
-        {
-            depths.insert(link, 0);
-            way.push((*link, joint));
-            at = joint.parent;
-        }
-        let mut depth = depths.get(at).copied().unwrap_or(0);
-        for (link, joint) in way.into_iter().rev() {
-            depth += usize::from(counts(joint));
-            depths.insert(link, depth);
-        }
-    }
-    depths
-}
-
-/// The links that are fixed to this one, those furthest from it first, itself last.
-fn rigid_with(joints: &BTreeMap<&str, Link<'_>>, link: &str) -> Vec<String> {
-    let mut fixed: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for (child, joint) in joints.iter().filter(|(_, joint)| !joint.moves) {
-        fixed.entry(joint.parent).or_default().push(child);
-    }
-    let mut all = vec![(0, link)];
-    let mut at = 0;
-    // Each link has one joint here: only a loop comes by one again, and by this link.
-    while let Some((depth, own)) = all.get(at).copied() {
-        all.extend(fixed.remove(own).into_iter().flatten().map(|child| (depth + 1, child)));
-        at += 1;
-    }
-    all.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(b.1)));
-    all.into_iter().map(|(_, link)| link.to_owned()).collect()
 }
 
 #[cfg(test)]

@@ -10,6 +10,9 @@ pub enum InitError {
     /// What was recorded is not enough.
     #[error("{problem}")]
     Init { problem: String },
+    /// Nothing says where the tip was.
+    #[error("{problem}")]
+    NothingSeen { problem: String },
     /// A name that the user gave and that means nothing here.
     #[error("{problem}")]
     Usage { problem: String },

@@ -139,8 +139,9 @@ pub fn gather(arm: &Arm, read: &AllRead) -> Vec<Evidence> {
         let speeds = Speeds::of(&joints.time_ns, tip_m);
         let alike = |at: usize| {
             let seen = recording.body(at).filter(|seen| median_and_travel_m(seen).1 > STANDS_M)?;
-            // Clocks of other epochs are compared by log time.
-            let ahead_s = seen.other_epoch_s(joints);
+            // Clocks of other epochs are compared by log time, those of two computers by when each began.
+            let by_log_s = seen.other_epoch_s(joints);
+            let ahead_s = if by_log_s == 0.0 { seen.apart_s(joints) } else { by_log_s };
             let on_robot: Vec<i64> = seen.time_ns.iter().map(|t| t - (ahead_s * 1e9) as i64).collect();
             let found = compare_speeds(&speeds, &Speeds::of(&on_robot, |i| seen.position_m[i]))?;
             Some(Likeness { delay_s: found.delay_s + ahead_s, ..found })

@@ -2,8 +2,9 @@
 
 use crate::error::InitError;
 use armcal_config::{ConfigError, Manifest, RecordingEntry, recordings_below};
-use armcal_recording::{Recording, is_recording, is_url, without_ending};
+use armcal_recording::{Recording, is_recording, is_table, is_url, without_ending};
 use armcal_stages::RunError;
+use std::collections::BTreeSet;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +43,38 @@ pub fn open_all(inputs: &[String], out: &Path) -> Result<Vec<Opened>, InitError>
             parts.pop().map(|last| open_entry(RecordingEntry { name, paths, ..last.entry }))
         }
     };
-    whole.into_iter().filter_map(joined).collect()
+    join_halves(whole.into_iter().filter_map(joined).collect::<Result<_, InitError>>()?)
+}
+
+/// Files that hold the joints, and as many others that hold what a sensor saw meanwhile, are the halves of as many recordings, made
+/// on two computers; in the order of their times.
+fn join_halves(whole: Vec<Opened>) -> Result<Vec<Opened>, InitError> {
+    let has_joints = |o: &Opened| {
+        o.recording.report().channels.iter().any(|c| c.messages > 0 && c.decodable.as_deref() == Ok("joints"))
+    };
+    let topics = |of: &[&Opened]| -> BTreeSet<String> {
+        let used = of.iter().flat_map(|o| o.recording.report().channels.iter()).filter(|c| c.messages > 0);
+        used.map(|c| c.topic.clone()).collect()
+    };
+    let begins = |o: &&Opened| used_span_ns(&o.recording).map_or(i64::MAX, |(first, _)| first);
+    let (mut robots, mut sensors): (Vec<&Opened>, Vec<&Opened>) = whole.iter().partition(|o| has_joints(o));
+    if robots.len() != sensors.len() || !topics(&robots).is_disjoint(&topics(&sensors)) {
+        return Ok(whole);
+    }
+    robots.sort_by_key(begins);
+    sensors.sort_by_key(begins);
+    let pair = |(robot, sensor): (&&Opened, &&Opened)| {
+        let paths = [&robot.entry.paths[..], &sensor.entry.paths].concat();
+        open_entry(RecordingEntry { paths, ..robot.entry.clone() })
+    };
+    robots.iter().zip(&sensors).map(pair).collect()
+}
+
+/// First and last log time of a message.
+fn used_span_ns(recording: &Recording) -> Option<(i64, i64)> {
+    let used = recording.report().channels.iter().filter(|c| c.messages > 0);
+    let bounds = used.map(|c| (c.first_ns, c.last_ns));
+    bounds.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
 }
 
 fn open_entry(entry: RecordingEntry) -> Result<Opened, InitError> {
@@ -59,13 +91,7 @@ fn is_continuation(before: &Opened, next: &Opened) -> bool {
     if !in_order || before.entry.paths[0].parent() != next.entry.paths[0].parent() {
         return false;
     }
-    let used = |recording: &Recording| -> Option<(i64, i64)> {
-        let report = recording.report();
-        let used = report.channels.iter().filter(|c| c.messages > 0);
-        let bounds = used.map(|c| (c.first_ns, c.last_ns));
-        bounds.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
-    };
-    let spans = used(&before.recording).zip(used(&next.recording));
+    let spans = used_span_ns(&before.recording).zip(used_span_ns(&next.recording));
     spans.is_some_and(|((_, end), (start, _))| start.abs_diff(end) < NEXT_PART_NS as u64)
 }
 
@@ -97,9 +123,7 @@ fn refuse_non_recording(path: &Path) -> Result<(), InitError> {
         b if b.starts_with(b"\x89MCAP") => ("a recording (MCAP)", ".mcap"),
         b if b.starts_with(b"SQLite format 3\0") => ("a database (SQLite)", ".db3"),
         [0x28, 0xb5, 0x2f, 0xfd, ..] => ("compressed (zstd)", ".mcap.zstd or .db3.zstd"),
-        b if b.starts_with(b"#ROSBAG") => {
-            return refused("is a ROS 1 bag: convert it with `mcap convert in.bag out.mcap`".into());
-        }
+        b if b.starts_with(b"#ROSBAG") => ("a ROS 1 bag", ".bag"),
         [] => {
             return refused(
                 "is empty: nothing was recorded, or the recorder was ended before it wrote".into(),
@@ -111,7 +135,10 @@ fn refuse_non_recording(path: &Path) -> Result<(), InitError> {
         b if b.trim_ascii_start().starts_with(b"<") => {
             return refused("is XML and no recording: a URDF is given with --urdf".into());
         }
-        _ => return refused("is no MCAP recording and no rosbag2 database".into()),
+        _ if is_table(path) => return Ok(()),
+        _ => {
+            return refused("is no MCAP recording, no bag, and no table (.csv, .tsv, .parquet, .npz)".into());
+        }
     };
     match is_recording(path) {
         true => Ok(()),

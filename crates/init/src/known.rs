@@ -38,4 +38,6 @@ pub struct Known<'a> {
     pub warm: &'a [(String, String)],
     /// Mistakes that are undone where the recordings are read.
     pub mended: &'a [String],
+    /// Noise of a sensor of which each pause has one pose, where it is known better than assumed [mm].
+    pub noise_mm: Option<f64>,
 }

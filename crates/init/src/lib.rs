@@ -8,6 +8,7 @@
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod arm;
+mod attitude;
 mod channels;
 mod draft;
 mod error;
@@ -16,6 +17,7 @@ mod fields;
 mod files;
 mod frames;
 mod known;
+mod links;
 mod lists;
 mod missing;
 mod motion;
@@ -27,6 +29,7 @@ mod roles;
 mod seats;
 mod singles;
 mod sockets;
+mod telescope;
 mod topics;
 
 pub use arm::Told;
@@ -72,14 +75,17 @@ pub struct Asked {
 /// # Errors
 /// What is no recording, no arm, joints that are not recorded, an arm that never pauses, nothing that says where the tip was.
 pub fn propose(asked: &Asked, progress: &dyn Steps) -> Result<Proposal, InitError> {
-    let as_seen = mended(asked, Taken::default(), progress)?;
-    let at_end = as_seen.bodies.iter().any(|(_, cast)| cast.role == Role::Tip);
-    if as_seen.is_plausible() || at_end {
-        return Ok(as_seen);
+    let as_seen = mended(asked, Taken::default(), progress);
+    let settled = match &as_seen {
+        Ok(seen) => seen.is_plausible() || seen.bodies.iter().any(|(_, cast)| cast.role == Role::Tip),
+        Err(refused) => !matches!(refused, InitError::NothingSeen { .. }),
+    };
+    if settled {
+        return as_seen;
     }
-    // A reading that is wrong at the last joint moves the tip from its link to the one before.
+    // A reading that is wrong at the last joints moves the tip from its link to one before.
     let last = mended(asked, Taken { at_end: true, ..Taken::default() }, progress);
-    Ok(last.ok().filter(|last| last.is_plausible()).unwrap_or(as_seen))
+    last.ok().filter(|last| last.is_plausible()).map_or(as_seen, Ok)
 }
 
 /// A proposal, and the one in which the mistakes that its trial showed are undone, one after the other, while each is the better one.
@@ -100,6 +106,10 @@ fn mended(asked: &Asked, mut taken: Taken, progress: &dyn Steps) -> Result<Propo
             _ => break,
         }
     }
+    taken.noise_mm = best.quieter_mm();
+    if taken.noise_mm.is_some() {
+        best = propose_taken(asked, &taken, progress)?;
+    }
     Ok(best)
 }
 
@@ -112,6 +122,8 @@ struct Taken {
     why: Vec<String>,
     /// Whether a body that follows a link before the last is on the last one.
     at_end: bool,
+    /// Noise of a sensor of which each pause has one pose, where a first calibration left less than is assumed [mm].
+    noise_mm: Option<f64>,
 }
 
 fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<Proposal, InitError> {
@@ -157,6 +169,9 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
         rates.into_iter().for_each(|(body, rate)| read.set_clock_rate(body, rate));
         evidence = evidence::gather(&arm, &read);
     }
+    for (body, turn) in attitude::other_axes(&arm, &read, &evidence) {
+        read.set_orientation_axes(body, &turn);
+    }
     let (cast, seats) = roles::assign_roles(&arm, &evidence, board.as_ref(), taken.at_end);
     let tracked = !points.is_empty()
         || cast.iter().any(|c| matches!(c.role, Role::Tip) || matches!(c.role, Role::Marker(_)) && c.sure);
@@ -179,6 +194,7 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
         points,
         warm: &channels.warm,
         mended: &taken.why,
+        noise_mm: taken.noise_mm,
     };
     if known.sockets.is_some() && known.board.is_none() {
         progress.step("measuring the sockets");
@@ -209,7 +225,7 @@ fn nothing_seen(arm: &arm::Arm, read: &read::AllRead, cast: &[Cast]) -> InitErro
         "nothing says where the tip was: {bodies}{left}; and its pauses are not in a few places that it came back to in other \
          postures. Give --board FILE if it sat in cavities of a board (docs/guide.md shows one){unsure}"
     );
-    InitError::Init { problem }
+    InitError::NothingSeen { problem }
 }
 
 /// Finds how large the fixture is, with the pipeline as it would be proposed.
@@ -242,6 +258,8 @@ pub struct Tried {
     pub points: usize,
     /// Mean error there before and after [m].
     pub mean_m: [f64; 2],
+    /// Fewer equations than free parameters, in words.
+    pub too_few: Option<String>,
     /// What contradicts the data about the setup, in words.
     pub mistakes: Vec<String>,
     /// What would undo each of them where the recordings are read.
@@ -258,7 +276,8 @@ fn try_proposal(proposal: &Proposal) -> Result<Tried, String> {
         let judged = settled.fitted.calibration.judged();
         let (mistakes, mends) = settled.setup.mistakes().map(|m| (m.message.clone(), m.mend.clone())).unzip();
         let mean_m = [judged.nominal.mean_m, judged.fitted.mean_m];
-        Ok(Tried { points: judged.fitted.n, mean_m, mistakes, mends })
+        let too_few = settled.fitted.calibration.fit.too_few_dwells().map(|w| w.message.clone());
+        Ok(Tried { points: judged.fitted.n, mean_m, too_few, mistakes, mends })
     };
     attempt().map_err(|e| e.to_string())
 }

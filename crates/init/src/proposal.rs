@@ -58,9 +58,19 @@ impl Proposal {
         self.error_m() < PLAUSIBLE_M.max(PLAUSIBLE_SHARE * nominal_m)
     }
 
+    /// The noise per axis that a first calibration left, where the sensor shows none by itself and less was left than is assumed [mm].
+    pub fn quieter_mm(&self) -> Option<f64> {
+        let told = matches!(&self.tried, Some(Ok(tried)) if tried.too_few.is_none());
+        let assumed_mm = if told { self.pipeline.observations.sensor_sigma_mm } else { 0.0 };
+        // The length of three errors of one size has this mean.
+        let left_mm = self.error_m() * 1e3 / (8.0 / std::f64::consts::PI).sqrt();
+        (left_mm > 0.0 && left_mm < assumed_mm).then_some(left_mm)
+    }
+
     /// Whether a first calibration with it went well.
     pub fn runs(&self) -> bool {
-        let sound = matches!(&self.tried, Some(Ok(tried)) if tried.mistakes.is_empty());
+        let sound =
+            matches!(&self.tried, Some(Ok(tried)) if tried.mistakes.is_empty() && tried.too_few.is_none());
         sound && self.is_plausible()
     }
 

@@ -6,12 +6,13 @@ use super::files::Opened;
 use super::frames;
 use super::topics::{BodyTopic, JointTopic};
 use crate::error::InitError;
-use armcal_core::{Dwell, PoseSamples, Samples};
+use armcal_core::{Dwell, Mend, PoseSamples, Samples};
 use armcal_dwell::{DwellConfig, detect_dwells};
 use armcal_recording::{
     JointStream, JointUnit, LengthUnit, PoseStream, RecordingError, ScalarStream, StreamReport, Streams,
 };
 use armcal_stages::RunError;
+use nalgebra::Matrix3;
 
 /// More bodies than this are the frames of a simulation.
 const MOST_BODIES: usize = 24;
@@ -59,6 +60,15 @@ impl AllRead {
         self.streams.bodies.get_mut(&key).into_iter().for_each(|stream| stream.clock_rate = Some(rate));
         let seen = self.recordings.iter_mut().filter_map(|r| r.samples.bodies.get_mut(&key));
         seen.for_each(|seen| seen.slow_down(rate));
+    }
+
+    /// Takes the orientations of a body for those in axes that a turn carries onto those of its positions.
+    pub fn set_orientation_axes(&mut self, body: usize, turn: &Matrix3<f64>) {
+        let mut alone =
+            Streams { tip: self.streams.bodies.get(&body_key(body)).cloned(), ..Streams::default() };
+        if alone.mend(&Mend::OrientationAxes(*turn)) {
+            self.streams.bodies.extend(alone.tip.map(|mended| (body_key(body), mended)));
+        }
     }
 }
 
@@ -109,6 +119,7 @@ pub fn read_recordings(
             names: arm.names.clone(),
             position: field.map_or(Vec::new(), |f| f.positions.clone()),
             name: field.and_then(|f| f.name.clone()),
+            unit: field.filter(|f| f.says_degrees()).map_or(JointUnit::Rad, |_| JointUnit::Deg),
             ..JointStream::default()
         }],
         bodies: bodies.iter().enumerate().map(|(at, body)| (body_key(at), pose(body))).collect(),
@@ -140,9 +151,9 @@ fn take_mends(streams: &mut Streams, mended: &Streams) {
     for own in streams.bodies.values_mut() {
         let same = |m: &&&PoseStream| (&m.topic, &m.body, &m.frame) == (&own.topic, &own.body, &own.frame);
         if let Some(mended) = all.iter().find(same) {
-            let PoseStream { axes, orientation_axes, invert, clock_rate, .. } = **mended;
+            let PoseStream { axes, orientation_axes, invert, clock_rate, scale, .. } = **mended;
             (own.axes, own.orientation_axes, own.invert) = (axes, orientation_axes, invert);
-            own.clock_rate = clock_rate;
+            (own.clock_rate, own.scale) = (clock_rate, scale);
         }
     }
 }

@@ -72,3 +72,30 @@ pub struct Field {
     /// Why they are taken for positions.
     pub why: String,
 }
+
+impl Field {
+    /// Whether the names of all fields say that they are in degrees, as `q1_deg` and `A1 [deg]` do.
+    pub fn says_degrees(&self) -> bool {
+        let says = |path: &String| {
+            let lower = path.to_lowercase();
+            let mut words = lower.split(|c: char| !c.is_alphanumeric() && c != '\u{b0}');
+            words.any(|word| ["deg", "degree", "degrees", "\u{b0}"].contains(&word))
+        };
+        !self.positions.is_empty() && self.positions.iter().all(says)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_in_the_names_of_all_fields_is_theirs() {
+        let says = |paths: &[&str]| {
+            let positions = paths.iter().map(|path| (*path).to_owned()).collect();
+            Field { positions, name: None, values: paths.len(), surety: 2, why: String::new() }.says_degrees()
+        };
+        assert!(says(&["q1_deg", "q2_deg"]) && says(&["'A1 [\u{b0}]'"]) && says(&["joints_degrees[]"]));
+        assert!(!says(&["q1", "q2_deg"]) && !says(&["q1"]) && !says(&[]));
+    }
+}

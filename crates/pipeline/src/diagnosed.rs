@@ -27,6 +27,9 @@ pub(crate) fn run_diagnosis(
     if !pipeline.diagnosis.enabled {
         return Ok(None);
     }
+    if let Some(few) = calibrated.calibration.fit.too_few_dwells() {
+        return Err(RunError::TooFewDwells { why: few.message.clone() });
+    }
     progress.step("diagnosing");
     Ok(Some(diagnose(calibrated, &pipeline.diagnosis)?))
 }
@@ -37,6 +40,7 @@ pub(crate) fn set_diagnosis(run: &mut Run, found: Result<Option<Diagnosis>, RunE
         Ok(Some(diagnosis)) => (Some(diagnosis), None),
         Ok(None) => (None, Some(Undiagnosed::NotAsked)),
         Err(RunError::SetupFirst { .. }) => (None, Some(Undiagnosed::SetupFirst)),
+        Err(RunError::TooFewDwells { .. }) => (None, Some(Undiagnosed::TooFewDwells)),
         Err(e) => {
             let message = format!("what is missing could not be looked for: {e}; the calibration stands");
             let (severity, stage) = (Severity::Inadequate, Stage::Diagnose);

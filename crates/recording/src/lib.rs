@@ -4,7 +4,7 @@
 //! * `bytes`: a `map` of a file, or `ranges` of one that is read on demand, such as an `object` behind a `url`, within a `budget`;
 //! * `structure`: `records` (envelopes), `layout` (where messages lie, by walking a map) or `index` (by the summary alone),
 //!   `chunk` (inflated and checked), `channels`;
-//! * `foreign`: of another format, such as rosbag2's database, a copy of its messages;
+//! * `foreign`: of another format (bags of ROS 1 and 2, tables), a copy of its messages;
 //! * `recording`: its files, opened; `judge` holds the records of a block against its indexes, `sweep` passes over all blocks in
 //!   parallel, results in file order; channels without a usable definition get one (`substitute`); what was read is compared with whatever else says what was written (`witness`, of rosbag2
 //!   `bag`). A disagreement is data lost, which the process remembers ([`data_loss_warnings`]);
@@ -40,7 +40,7 @@ pub use bytes::remote::list_objects;
 pub use bytes::url::{is_url, resolve_path};
 pub use error::{RecordingError, nearest_name, shortened};
 pub use foreign::inflate_message;
-pub use foreign::names::{files_of, is_recording, recordings_at, without_ending};
+pub use foreign::names::{files_of, is_recording, is_table, recordings_at, without_ending};
 pub use recording::Recording;
 pub use recording::bag::read_with;
 pub use recording::losses::data_loss_warnings;

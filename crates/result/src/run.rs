@@ -77,6 +77,8 @@ pub enum Undiagnosed {
         /// How many may be.
         most: usize,
     },
+    /// There are fewer equations than free parameters, which follow anything; a warning says how many.
+    TooFewDwells,
     /// It could not be made; a warning says why.
     Failed,
 }
@@ -307,10 +309,10 @@ impl RecordingRun {
         self.earlier.as_ref().map_or(self.rejections.len(), |earlier| earlier.rejected)
     }
 
-    /// Offset [ms] and drift [ppm] of the sensor's clock in words, where there is one.
+    /// Offset at its first stamp [ms] and drift [ppm] of the sensor's clock in words, where there is one.
     pub fn clock_shown(&self) -> Option<[String; 2]> {
         let c = self.clock.as_ref()?;
-        let [offset_ms, offset_sigma_ms] = [c.offset_s, c.offset_sigma_s].map(|s| s * 1e3);
+        let [offset_ms, offset_sigma_ms] = c.first_offset_s().map(|s| s * 1e3);
         let [drift_ppm, drift_sigma_ppm] = [c.drift, c.drift_sigma].map(|d| d * 1e6);
         Some(match c.declared {
             true => [format!("{offset_ms:.2} declared"), format!("{drift_ppm:.1} declared")],

@@ -45,11 +45,24 @@ fn refine_numbers(now: &Inputs, before: &Misfit, tried: &mut Vec<Tried>) {
         let place = tried.iter().take_while(|t| !own(t)).count();
         let (values, others): (Vec<Tried>, Vec<Tried>) = std::mem::take(tried).into_iter().partition(own);
         *tried = others;
-        let best = values.into_iter().min_by(|a, b| a.misfit.log.total_cmp(&b.misfit.log));
         // A number that changes nothing fits as well at any value.
-        let worth = best.filter(|best| best.misfit.log < before.log - SAME_FACTOR.ln());
+        let worth = nearest_value(values, before);
         tried.splice(place..place, worth.map(|best| golden_section_search(now, before, best)));
     }
+}
+
+/// The value that fits best, of those that fit better than without the change: by each dwell, or, where a precise sensor finds all of
+/// them as bad as can be, by how far they are off together.
+fn nearest_value(values: Vec<Tried>, before: &Misfit) -> Option<Tried> {
+    let falls = |t: &Tried| t.misfit.log < before.log - SAME_FACTOR.ln();
+    let nears =
+        |t: &Tried| t.misfit.used >= before.used && t.misfit.of_spread() < before.of_spread() / SAME_FACTOR;
+    let by_dwells = values.iter().any(falls);
+    let worth = values.into_iter().filter(|t| if by_dwells { falls(t) } else { nears(t) });
+    worth.min_by(|a, b| match by_dwells {
+        true => a.misfit.log.total_cmp(&b.misfit.log),
+        false => a.misfit.of_spread().total_cmp(&b.misfit.of_spread()),
+    })
 }
 
 /// The best value of a number between the neighbours of the one that was tried, by golden section.
@@ -84,7 +97,22 @@ fn golden_section_search(now: &Inputs, before: &Misfit, tried: Tried) -> Tried {
             best = other;
         }
     }
-    best
+    rounded(best, &number, &at)
+}
+
+/// A factor as somebody would have entered it, itself or its reciprocal to two digits, where that fits as well.
+fn rounded(best: Tried, number: &Number, at: &dyn Fn(f64) -> Option<Tried>) -> Tried {
+    let Some(value) = best.hypothesis.number.as_ref().map(|n| n.value).filter(|_| number.nothing == 1.0)
+    else {
+        return best;
+    };
+    let to_two = |x: f64| (x * 100.0).round() / 100.0;
+    let near = [to_two(value), 1.0 / to_two(1.0 / value)];
+    let inside = |x: &f64| (number.between[0]..=number.between[1]).contains(x);
+    let tried = near.into_iter().filter(inside).filter_map(at);
+    let as_well = |t: &Tried| t.misfit.of_spread() <= SAME_FACTOR * best.misfit.of_spread();
+    let round = tried.filter(as_well).min_by(|a, b| a.misfit.of_spread().total_cmp(&b.misfit.of_spread()));
+    round.unwrap_or(best)
 }
 
 /// The rounds of a trial, which end where nothing more could come of it.

@@ -8,10 +8,10 @@ use super::hypotheses::{Freedom, Hypothesis, hypotheses_by_rarity};
 use super::trial::{Misfit, compute_misfit, for_trials};
 use super::unseen::untestable_sign;
 use super::weigh::{
-    ALIKE_FACTOR, at_the_floor, explains_errors, far_enough, in_doubt, is_certain, most_parsimonious,
-    physics_explains_better,
+    ALIKE_FACTOR, at_the_floor, explains_errors, far_enough, in_doubt, is_certain, is_gross,
+    most_parsimonious, physics_explains_better,
 };
-use armcal_core::{Certainty, Code, Parameter, Role, SetupFinding, SetupReport};
+use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
 use armcal_stages::{Fitted, Inputs};
 
 /// Mistakes one upon the other.
@@ -62,8 +62,8 @@ fn one_upon_the_other(
         let (mut tried, mut within) = (Vec::new(), Vec::new());
         let physics = Physics::of(&now, first.as_ref());
         // Fewer equations than parameters follow any number that is let go.
-        let few = first.as_ref().is_some_and(has_too_few_dwells);
-        for mut some in hypotheses_by_rarity(&now, &at_bound) {
+        let few = first.as_ref().is_some_and(|f| f.calibration.fit.too_few_dwells().is_some());
+        for mut some in hypotheses_by_rarity(&now, &at_bound, is_gross(&before)) {
             some.retain(|h| !few || h.freedom == Freedom::Discrete);
             // A frame that is let go takes a share of anything: what is rarer may still fit better.
             if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {
@@ -178,10 +178,6 @@ fn classify_explanations(
         }
     }
     (far, within)
-}
-
-fn has_too_few_dwells(fitted: &Fitted) -> bool {
-    fitted.calibration.fit.warnings.iter().any(|w| w.code == Code::TooFewDwells)
 }
 
 fn at_bound(fitted: &Fitted) -> Vec<Parameter> {

@@ -69,6 +69,9 @@ pub enum RunError {
     /// Nothing can be calibrated, and a mistake of the setup explains it.
     #[error("{mistakes} (as it is: {source})")]
     Setup { source: Box<RunError>, mistakes: String },
+    /// A fit whose parameters follow anything says nothing of what is missing.
+    #[error("what is missing cannot be looked for: {why}")]
+    TooFewDwells { why: String },
     /// A mistake of the setup stands before any diagnosis.
     #[error(
         "the setup of `{pipeline}` contradicts the data, so no physical effect is looked for [{code}]: {message}"

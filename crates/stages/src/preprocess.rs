@@ -125,10 +125,14 @@ fn dwells_of_one(
     let clock = match alignment_feature(&samples, speed_model) {
         Some((feature, tip)) => {
             let doubts = Doubts::of(pipeline, speed_model, feature);
-            let aligned = align_clocks(&samples.joints, tip, &doubts, &pipeline.clock);
-            let aligned = match (aligned, tip.is_one_a_stop()) {
-                (Err(_), true) => Ok(clock_of_stops(&samples.joints, tip)),
-                (aligned, _) => aligned,
+            let is_declared = pipeline.clock.known.is_some() || pipeline.clock.offset_ms.is_some();
+            let of_stops = || Ok(clock_of_stops(&samples.joints, tip, pipeline.clock.initial_offset_s));
+            let aligned = match tip.shows_no_motion() && !is_declared {
+                true => of_stops(),
+                false => match align_clocks(&samples.joints, tip, &doubts, &pipeline.clock) {
+                    Err(_) if tip.is_one_a_stop() => of_stops(),
+                    aligned => aligned,
+                },
             };
             let (clock, said) = aligned.map_err(|source| {
                 let with = |reading: &Reading| {
@@ -210,15 +214,22 @@ fn alignment_feature<'s>(samples: &'s Samples, model: &Model) -> Option<(Feature
     seen.into_iter().find(|(_, seen)| !seen.is_empty())
 }
 
-/// One pose a stop shows no motion: its clock is that of the joints, but for what log time tells of their epochs.
-fn clock_of_stops(joints: &JointSamples, tip: &PoseSamples) -> (ClockAlignment, Vec<Warning>) {
-    let offset_s = tip.other_epoch_s(joints);
+/// One pose a stop shows no motion: its clock is that of the joints, but for what log time tells of their epochs, or the pipeline.
+fn clock_of_stops(
+    joints: &JointSamples,
+    tip: &PoseSamples,
+    initial_s: f64,
+) -> (ClockAlignment, Vec<Warning>) {
+    let by_log_s = tip.other_epoch_s(joints);
+    let offset_s = if by_log_s == 0.0 { initial_s } else { by_log_s };
+    let first_ns = tip.time_ns.first().copied().unwrap_or_default();
     let clock = ClockAlignment {
         offset_s,
         offset_sigma_s: 0.0,
         drift: 0.0,
         drift_sigma: 0.0,
-        reference_ns: tip.time_ns.first().copied().unwrap_or_default(),
+        reference_ns: first_ns,
+        first_ns,
         correlation: f64::NAN,
         displacement_ratio: f64::NAN,
         declared: true,

@@ -1,7 +1,9 @@
 //! What a run says about its model in one word and one sentence: the same in every output.
 
 use crate::headline::headline;
+use crate::hunting::hunting_sentence;
 use armcal_core::{Certainty, SetupReport, printable_name};
+use armcal_diagnose::Verdict;
 use armcal_result::{Run, Undiagnosed};
 
 /// What a run says about its model in one word and one sentence.
@@ -20,14 +22,19 @@ pub fn answer(run: &Run) -> Answer {
     }
     if let Some(diagnosis) = &run.diagnosis {
         let beside = setup_beside(&run.setup).map(|beside| run.in_words(&beside));
-        let sentence =
-            [headline(&run.called(), diagnosis)].into_iter().chain(beside).collect::<Vec<_>>().join(" ");
+        let scattered = diagnosis.unexplained.as_ref().filter(|_| diagnosis.verdict == Verdict::Unexplained);
+        let hunting = scattered.and_then(|left| hunting_sentence(run, left.error_mm));
+        let sentence = [headline(&run.called(), diagnosis)].into_iter().chain(hunting).chain(beside);
+        let sentence = sentence.collect::<Vec<_>>().join(" ");
         return Answer { word: diagnosis.verdict.word(), sentence };
     }
     let sentence = match run.undiagnosed {
         Some(Undiagnosed::Failed) => "The diagnosis could not be made; the warnings say why.".to_owned(),
         Some(Undiagnosed::SetupFirst) => {
             "The setup comes first; what is missing was not looked for.".to_owned()
+        }
+        Some(Undiagnosed::TooFewDwells) => {
+            "Record more dwells: with fewer equations than free parameters what is missing cannot be looked for.".to_owned()
         }
         Some(Undiagnosed::TooLarge { free, most }) => format!(
             "What is missing was not looked for: that search works on all free parameters at once, here {free}, and {most} \

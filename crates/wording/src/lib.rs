@@ -7,6 +7,7 @@ mod drivers;
 mod explanations;
 mod found;
 mod headline;
+mod hunting;
 mod look_at;
 mod next;
 pub mod pool_story;

@@ -141,6 +141,9 @@ fn proposal_text(proposal: &Proposal) -> String {
                 "\n Tried: on {} points the mean error {goes} from {before} to {after} mm.",
                 tried.points
             );
+            if let Some(few) = &tried.too_few {
+                let _ = writeln!(out, " Too few dwells: {}.", printable_name(few));
+            }
             for mistake in &tried.mistakes {
                 let _ = writeln!(out, " Setup first: {}.", printable_name(mistake));
             }
@@ -177,7 +180,7 @@ fn json_of(proposal: &Proposal) -> Value {
     });
     let tried = match &proposal.tried {
         Some(Ok(t)) => {
-            json!({"points": t.points, "nominal_mm": t.mean_m[0] * 1e3, "calibrated_mm": t.mean_m[1] * 1e3, "mistakes": t.mistakes})
+            json!({"points": t.points, "nominal_mm": t.mean_m[0] * 1e3, "calibrated_mm": t.mean_m[1] * 1e3, "too_few": t.too_few, "mistakes": t.mistakes})
         }
         Some(Err(why)) => json!({"why_not": why}),
         None => Value::Null,

@@ -15,8 +15,13 @@ const SIGMAS: f64 = 5.0;
 const MOST: usize = 2;
 /// A dwell whose error is so many times what noise would give is gross: of three coordinates noise alone does that once in 10^13.
 const GROSS: f64 = 5.0;
-/// So many of the dwells may be gross and still be single ones.
+/// So many of the dwells may be gross and still be single ones; so many where each of them errs this many times as much, against
+/// its noise, as any other: a mixture of two kinds of dwells, as of a marker that flips in some.
 const FEW: f64 = 0.1;
+const SOME: f64 = 0.25;
+const APART: f64 = 3.0;
+/// Single dwells that are named one by one, at most.
+const NAMED: usize = 20;
 
 /// Dwells in which the error is larger than elsewhere.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -84,11 +89,18 @@ pub fn single_dwells(errors: &[DwellError<'_>], floor_factor: f64) -> Option<Err
     };
     let all = dwells_of(&mut errors.iter());
     let gross = dwells_of(&mut errors.iter().filter(|e| e.error_m > GROSS * e.expected_m));
-    if gross.is_empty() || gross.len() as f64 > FEW * all.len() as f64 {
+    let share = gross.len() as f64 / all.len().max(1) as f64;
+    if gross.is_empty() || share > SOME {
         return None;
     }
     let (inside, outside): (Vec<usize>, Vec<usize>) =
         (0..errors.len()).partition(|i| gross.contains(&errors[*i].observation.dwell));
+    let times = |i: &usize| errors[*i].ln_times_noise().exp();
+    let least = inside.iter().map(times).fold(f64::INFINITY, f64::min);
+    let most = outside.iter().map(times).fold(0.0, f64::max);
+    if share > FEW && least < APART * most {
+        return None;
+    }
     let every: Vec<usize> = (0..errors.len()).collect();
     let at_floor = |of: &[usize]| {
         let sum = |value: fn(&DwellError<'_>) -> f64| of.iter().map(|i| value(&errors[*i])).sum::<f64>();
@@ -96,7 +108,8 @@ pub fn single_dwells(errors: &[DwellError<'_>], floor_factor: f64) -> Option<Err
     };
     let for_them_alone = at_floor(&outside) && !at_floor(&every);
     let names: Vec<String> = gross.iter().map(ToString::to_string).collect();
-    for_them_alone.then(|| ErrorPlace::of(list_names(&names), errors, (&inside, &outside)))
+    let told = if names.len() > NAMED { list_names(&names) } else { names.join(", ") };
+    for_them_alone.then(|| ErrorPlace::of(told, errors, (&inside, &outside)))
 }
 
 impl ErrorPlace {
@@ -252,11 +265,20 @@ mod tests {
         assert_eq!(single(&[], 1e-4), None);
         let twelve: Vec<usize> = (0..12).collect();
         assert!(single(&twelve, 1e-4).is_some(), "a tenth");
-        assert_eq!(
-            single(&[&twelve[..], &[40]].concat(), 1e-4),
-            None,
-            "more than a tenth are no single ones"
-        );
+        let more = |n: usize| single(&(0..n).collect::<Vec<_>>(), 1e-4);
+        assert!(more(13).is_some() && more(30).is_some(), "more than a tenth, far apart from all others");
+        assert_eq!(more(31), None, "more than a quarter are no single ones");
+        // Some that err little more than the others are one kind with them.
+        let graded = |n: usize| {
+            let of = |(i, observation)| {
+                let error_m =
+                    if i < n { 6e-4 } else { 1e-4 * (1.0 + 2.0 * f64::from(u8::from(i % 40 == 39))) };
+                DwellError { observation, error_m, expected_m: 1e-4 }
+            };
+            single_dwells(&all.iter().enumerate().map(of).collect::<Vec<_>>(), 1.5)
+        };
+        assert!(graded(12).is_some());
+        assert_eq!(graded(13), None, "more than a tenth, and not far apart from the others");
     }
 
     #[test]

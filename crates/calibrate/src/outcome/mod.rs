@@ -3,7 +3,7 @@
 pub(crate) mod covariance;
 
 use crate::outcome::covariance::Covariance;
-use armcal_core::{DwellId, ErrorStats, Observation, Parameter, Warning};
+use armcal_core::{Code, DwellId, ErrorStats, Observation, Parameter, Warning};
 use nalgebra::Vector3;
 
 /// One parameter after the fit.
@@ -83,6 +83,11 @@ impl Fit {
     /// The parameter vector in the model's order.
     pub fn values(&self) -> Vec<f64> {
         self.estimates.iter().map(|e| e.value).collect()
+    }
+
+    /// What was said of fewer equations than free parameters, which then follow anything.
+    pub fn too_few_dwells(&self) -> Option<&Warning> {
+        self.warnings.iter().find(|warning| warning.code == Code::TooFewDwells)
     }
 }
 

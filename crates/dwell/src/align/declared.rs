@@ -28,6 +28,7 @@ pub(super) fn align(
         drift: declared.drift,
         drift_sigma: SIGMA_FLOOR_S / seconds_between(first_ns, last_ns).max(1.0),
         reference_ns: first_ns,
+        first_ns,
         correlation: f64::NAN,
         displacement_ratio: f64::NAN,
         declared: true,

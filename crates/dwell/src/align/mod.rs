@@ -434,6 +434,7 @@ impl<'a> Streams<'a> {
             drift: fine.drift,
             drift_sigma: drift_sigma.max(SIGMA_FLOOR_S / last_s.max(1.0)),
             reference_ns: shift_ns(self.tip.time_ns[0], reference_s),
+            first_ns: self.tip.time_ns[0],
             correlation: if correlation.is_finite() { correlation.clamp(0.0, 1.0) } else { 0.0 },
             displacement_ratio,
             declared: false,

@@ -18,6 +18,8 @@ use std::collections::BTreeSet;
 const UNDONE: &str = "undoes what contradicts the data, as said above";
 /// A sensor that is later than this is searched around its delay [s].
 const LATE_S: f64 = 1.5;
+/// Noise of a sensor that shows none by itself, until a first calibration tells more [mm].
+const ASSUMED_MM: f64 = 0.1;
 /// A tilt worth declaring [rad].
 const TILT_RAD: f64 = 0.01;
 
@@ -183,8 +185,13 @@ impl Draft<'_> {
         let seen = self.known.read.recordings.iter().filter_map(|r| r.body(tip));
         if seen.into_iter().any(PoseSamples::is_one_a_stop) {
             self.page.section("[observations]");
-            self.page
-                .line("sensor_sigma_mm = 0.1", "assumed: one pose a stop shows no scatter; declare yours");
+            let (mm, why) = match self.known.noise_mm {
+                Some(mm) => {
+                    (mm, "at most: a first calibration leaves no more, and one pose a stop shows no scatter")
+                }
+                None => (ASSUMED_MM, "assumed: one pose a stop shows no scatter; declare yours"),
+            };
+            self.page.line(&format!("sensor_sigma_mm = {}", toml_float(mm, 4)), why);
         }
     }
 
@@ -216,8 +223,15 @@ impl Draft<'_> {
                 "its stamps run so many times as fast as those of the joints: only then do the speeds agree";
             self.page.line(&format!("clock_rate = {rate:.6}"), why);
         }
+        if let Some(scale) = stream.scale {
+            self.page.line(&format!("scale = {scale}"), UNDONE);
+        }
         if let Some(axes) = stream.axes {
             self.page.line(&format!("axes = {:?}", axes.map(Axis::word)), UNDONE);
+        }
+        if let Some(axes) = stream.orientation_axes {
+            let why = "its attitude is published in other axes than its position";
+            self.page.line(&format!("orientation_axes = {:?}", axes.map(Axis::word)), why);
         }
         if stream.invert {
             self.page.line("invert = true", UNDONE);

@@ -1,4 +1,4 @@
-//! A load at the tip that is not the declared one, in one recording.
+//! A load at the tip that is not the declared one, in one recording, or from a dwell on where the spec says so.
 //!
 //! # What moves
 //! Every joint that gravity loads yields under a weight that the pipeline does not know of, or does not yield under one
@@ -6,17 +6,17 @@
 //!
 //! # Equation
 //! `dq_j = y_j tau_j / (g L_j)`, tau_j the torque of a kilogram at the tip on joint j, L_j the length of the arm from
-//! joint j on; in the recording that the spec names. `y_j = m g L_j / K_j` for a mass m too many.
+//! joint j on; in the recording, or from the dwell on, that the spec names. `y_j = m g L_j / K_j` for a mass m too many.
 //!
 //! # Parameters and units
 //! `yield1`, `yield2`, ... y_j [rad] of the joints that gravity loads: how far each gives way with the arm stretched out
 //! level. Mass and stiffness are not told apart: a known load in another recording gives `K_j` (`compliance`).
 //!
 //! # Signature in the data
-//! In one recording the tip hangs lower than in the others (or higher), the more the further the arm reaches out.
+//! From then on the tip hangs lower (or higher), the more the further the arm reaches out.
 //!
 //! # Not to be confused with
-//! `zero_slip` and `frame_shift` between recordings, where the reach hardly varies; `tool_shift`, which turns with the
+//! `zero_slip` and `frame_shift` at the same moment, where the reach hardly varies; `tool_shift`, which turns with the
 //! last link. Weighing the tool separates them.
 //!
 //! # Source
@@ -35,7 +35,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     shapes: &[ARM],
     confused_with: &["zero_slip", "frame_shift", "tool_shift"],
     place: effect_placement,
-    look_at: "Weigh what the tool carried in that recording, and declare it as `load_kg`.",
+    look_at: "Weigh what the tool carried then, and declare it as `load_kg`.",
     told_by: "weigh what the tool carries, and declare it as `load_kg`",
     ..EffectKind::PLAIN
 };

@@ -14,7 +14,9 @@ mod database;
 mod definitions;
 mod inflate;
 pub(crate) mod names;
+mod rosbag1;
 mod rosbag2;
+pub(crate) mod table;
 mod wal;
 
 #[cfg(test)]
@@ -42,10 +44,23 @@ pub(crate) struct Converted {
     pub map: Map,
     /// What of the original could not be used.
     pub damage: Vec<Damage>,
+    /// What is assumed of it.
+    pub notes: Vec<String>,
     /// Identity of the log that was read with it.
     pub log: String,
-    /// Of a database: the types whose definitions are not its own. None where the file was in the original as it is.
-    pub known_here: Option<BTreeSet<String>>,
+    /// What it was made from.
+    pub origin: Origin,
+}
+
+/// What messages in an MCAP file were made from.
+#[derive(Debug)]
+pub(crate) enum Origin {
+    /// An MCAP file, which is here as it is.
+    Mcap,
+    /// A bag, and the types whose definitions are not its own.
+    Bag(BTreeSet<String>),
+    /// A table, which has no definitions.
+    Table,
 }
 
 /// What a file is, by its first bytes.
@@ -53,6 +68,7 @@ pub(crate) struct Converted {
 enum Kind {
     Mcap,
     Database,
+    Bag,
     Zstd,
 }
 
@@ -63,6 +79,7 @@ fn kind_of_head(head: &[u8]) -> Option<Kind> {
     match head {
         b if b.starts_with(mcap::MAGIC) => Some(Kind::Mcap),
         b if b.starts_with(b"SQLite format 3\0") => Some(Kind::Database),
+        b if b.starts_with(rosbag1::MAGIC) => Some(Kind::Bag),
         b if b.starts_with(&inflate::MAGIC) => Some(Kind::Zstd),
         _ => None,
     }
@@ -83,11 +100,13 @@ pub(crate) fn convert(
     path: &Path,
     allowance: &Allowance,
 ) -> Result<Option<Converted>, RecordingError> {
+    let whole = |read: &dyn Fn(&Map) -> Result<Converted, RecordingError>| match bytes {
+        FileBytes::Mapped(map) => read(map).map(Some),
+        FileBytes::Ranged(ranged) => read(&ranged.spool(path)?).map(Some),
+    };
     match kind_of(bytes)? {
-        Some(Kind::Zstd) => match bytes {
-            FileBytes::Mapped(map) => in_frame(map, path, allowance).map(Some),
-            FileBytes::Ranged(ranged) => in_frame(&ranged.spool(path)?, path, allowance).map(Some),
-        },
+        Some(Kind::Zstd) => whole(&|map| in_frame(map, path, allowance)),
+        Some(Kind::Bag) => whole(&|map| convert_bag(map, path, allowance)),
         Some(Kind::Database) => match bytes {
             FileBytes::Ranged(object) if url::is_url(path) => {
                 let mut file = tempfile::NamedTempFile::new().map_err(no_room(path))?;
@@ -96,7 +115,15 @@ pub(crate) fn convert(
             }
             _ => convert_database(path, path, allowance).map(Some),
         },
-        Some(Kind::Mcap) | None => Ok(None),
+        Some(Kind::Mcap) => Ok(None),
+        None => match names::table_format(path) {
+            Some(format) => whole(&|map| {
+                let mut copy = Copy::create(path, ["", "table"])?;
+                table::read(map, (path, format), &mut copy, allowance)?;
+                copy.finish(String::new(), Origin::Table)
+            }),
+            None => Ok(None),
+        },
     }
 }
 
@@ -116,7 +143,13 @@ fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, 
             let mut map = Map::of(named.as_file()).map_err(no_room(path))?;
             // The identity is that of the original.
             map.hashed = None;
-            Ok(Converted { map, damage, log: String::new(), known_here: None })
+            Ok(Converted { map, damage, notes: Vec::new(), log: String::new(), origin: Origin::Mcap })
+        }
+        Some(Kind::Bag) => {
+            let map = Map::of(named.as_file()).map_err(no_room(path))?;
+            let mut converted = convert_bag(&map, path, allowance)?;
+            converted.damage.splice(0..0, damage);
+            Ok(converted)
         }
         Some(Kind::Database) => {
             let mut converted = convert_database(named.path(), path, allowance)?;
@@ -125,8 +158,7 @@ fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, 
         }
         Some(Kind::Zstd) | None => {
             let cut = damage.first().map(|d| format!("; {}", d.why)).unwrap_or_default();
-            let why =
-                format!("it is a compressed file (zstd), but no MCAP file or rosbag2 database is in it{cut}");
+            let why = format!("it is a compressed file (zstd), but no MCAP file and no bag is in it{cut}");
             Err(RecordingError::NotMcap { path: path.to_owned(), why })
         }
     }
@@ -134,7 +166,14 @@ fn in_frame(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, 
 
 /// The messages of the rosbag2 database `file`, which is or was made of `path`.
 fn convert_database(file: &Path, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
-    let mut copy = Copy::create(path)?;
+    let mut copy = Copy::create(path, ["ros2", "rosbag2 sqlite3"])?;
     let (log, known_here) = rosbag2::read(file, &mut copy, allowance)?;
-    copy.finish(log, known_here)
+    copy.finish(log, Origin::Bag(known_here))
+}
+
+/// The messages of a ROS 1 bag.
+fn convert_bag(map: &Map, path: &Path, allowance: &Allowance) -> Result<Converted, RecordingError> {
+    let mut copy = Copy::create(path, ["ros1", "rosbag 2.0"])?;
+    rosbag1::read(map, &mut copy, allowance)?;
+    copy.finish(String::new(), Origin::Bag(BTreeSet::new()))
 }

@@ -2,7 +2,7 @@
 
 use crate::bytes::budget::Allowance;
 use crate::bytes::{Access, FileBytes};
-use crate::foreign::{self, Converted};
+use crate::foreign::{self, Converted, Origin};
 use crate::structure::channels::DEFINITION_FROM;
 use crate::structure::damage::Damage;
 use crate::structure::index::{self, Found};
@@ -53,11 +53,11 @@ enum Copied {
         original: FileBytes,
         /// What of it could not be used, or disagrees with the rest.
         damage: Vec<Damage>,
+        /// What is assumed of it.
+        notes: Vec<String>,
         /// Identity of the log that was read with it.
         log: String,
-        /// Of a database: the types whose definitions are not its own. None where the messages are in an MCAP file of somebody
-        /// else's.
-        known_here: Option<BTreeSet<String>>,
+        origin: Origin,
     },
 }
 
@@ -106,12 +106,12 @@ impl RecordingFile {
     fn converted(mut self, why: String, allowance: &Allowance) -> Result<RecordingFile, RecordingError> {
         let not_mcap = |why: String| RecordingError::NotMcap { path: self.path.clone(), why };
         let converted = foreign::convert(&self.bytes, &self.path, allowance)?;
-        let Some(Converted { map, damage, log, known_here }) = converted else {
+        let Some(Converted { map, damage, notes, log, origin }) = converted else {
             return Err(not_mcap(why));
         };
         self.layout = Layout::of(&map, allowance).map_err(not_mcap)?;
         let original = std::mem::replace(&mut self.bytes, FileBytes::Mapped(map));
-        self.copied = Some(Copied::Messages { original, damage, log, known_here });
+        self.copied = Some(Copied::Messages { original, damage, notes, log, origin });
         Ok(self)
     }
 
@@ -120,9 +120,9 @@ impl RecordingFile {
         self.layout.definitions.channels()
     }
 
-    /// Notes at the channels of a database where their definitions are from.
+    /// Notes at the channels of a bag where their definitions are from.
     pub fn annotate(&mut self) {
-        let Some(Copied::Messages { known_here: Some(known), .. }) = &self.copied else { return };
+        let Some(Copied::Messages { origin: Origin::Bag(known), .. }) = &self.copied else { return };
         self.layout.definitions.annotate(|channel| {
             let schema = channel.schema.as_ref().filter(|schema| !schema.data.is_empty())?;
             let from = if known.contains(&*schema.name) { "armcal" } else { "bag" };
@@ -139,9 +139,9 @@ impl RecordingFile {
             _ => bytes.identity(data_end)?,
         };
         match (&self.copied, &self.bytes) {
-            (Some(Copied::Messages { log, known_here, .. }), FileBytes::Mapped(map)) => {
+            (Some(Copied::Messages { log, origin, .. }), FileBytes::Mapped(map)) => {
                 identity += log;
-                crc = known_here.is_none().then(|| map.crc(data_end));
+                crc = matches!(origin, Origin::Mcap).then(|| map.crc(data_end));
             }
             (Some(_), FileBytes::Mapped(map)) if crc.is_none() => crc = Some(map.crc(data_end)),
             _ => {}
@@ -233,6 +233,14 @@ impl RecordingFile {
             let text = format!("at byte {}: {}", d.offset, d.why);
             Warning::new(severity, Stage::Recording, code, subject, text)
         };
-        damage.iter().map(warn).collect()
+        let notes: &[String] = match &self.copied {
+            Some(Copied::Messages { notes, .. }) => notes,
+            _ => &[],
+        };
+        let note = |said: &String| {
+            let subject = self.path.display().to_string();
+            Warning::new(Severity::Notice, Stage::Recording, Code::TableRead, subject, said.clone())
+        };
+        damage.iter().map(warn).chain(notes.iter().map(note)).collect()
     }
 }

@@ -1,7 +1,7 @@
-//! Mistakes of wiring and of drivers, undone while a recording is read: `factors`, `zeros_deg`, `axes`, `invert`.
+//! Mistakes of wiring and of drivers, undone while a recording is read: `factors`, `zeros_deg`, `axes`, `scale`, `invert`.
 
 use super::{JointStream, PoseStream, Streams};
-use armcal_core::{JointSamples, Mend, Pose, PoseSamples};
+use armcal_core::{JointSamples, Mend, Pose, PoseSamples, in_axes};
 use nalgebra::{Matrix3, Translation3};
 use serde::{Deserialize, Serialize};
 
@@ -133,10 +133,12 @@ impl PoseStream {
                 ));
             }
         }
-        if self.clock_rate.is_some_and(|rate| !(rate.is_finite() && rate > 0.0)) {
-            return Err("`clock_rate` must be a positive number".to_owned());
+        let numbers = [("clock_rate", self.clock_rate), ("scale", self.scale)];
+        let wrong = |of: &&(&str, Option<f64>)| of.1.is_some_and(|x| !(x.is_finite() && x > 0.0));
+        match numbers.iter().find(wrong) {
+            Some((key, _)) => Err(format!("`{key}` must be a positive number")),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Poses as they would be without the mistakes.
@@ -144,14 +146,14 @@ impl PoseStream {
         if let Some(rate) = self.clock_rate {
             samples.slow_down(rate);
         }
+        if let Some(scale) = self.scale {
+            samples.position_m.iter_mut().for_each(|p| *p *= scale);
+        }
         if let Some(axes) = self.axes.map(matrix_of) {
             samples.position_m.iter_mut().for_each(|p| *p = axes * *p);
         }
         if let Some((axes, turned)) = self.orientation_axes.map(matrix_of).zip(samples.orientation.as_mut()) {
-            turned.iter_mut().for_each(|q| {
-                let rotation = axes * q.to_rotation_matrix().matrix() * axes.transpose();
-                *q = nalgebra::UnitQuaternion::from_matrix(&rotation);
-            });
+            turned.iter_mut().for_each(|q| *q = in_axes(&axes, q));
         }
         if !self.invert {
             return Ok(());
@@ -186,6 +188,18 @@ impl Streams {
                 }
                 bodies.iter_mut().for_each(|s| s.axes = Some(axes));
             }
+            Mend::Scale(by) => {
+                let now = |s: &PoseStream| Some((by * s.scale.unwrap_or(1.0) * 1e4).round() / 1e4);
+                self.bodies_of(mend).into_iter().for_each(|s| s.scale = now(s));
+            }
+            Mend::OrientationAxes(matrix) => {
+                let Some(axes) = axes_of(matrix) else { return false };
+                let mut bodies = self.bodies_of(mend);
+                if bodies.iter().any(|s| s.orientation_axes.is_some() || s.invert) {
+                    return false;
+                }
+                bodies.iter_mut().for_each(|s| s.orientation_axes = Some(axes));
+            }
             Mend::Inverted | Mend::TipInverted => {
                 self.bodies_of(mend).into_iter().for_each(|s| s.invert = !s.invert);
             }
@@ -212,6 +226,14 @@ impl Streams {
                 let words = axes_of(matrix)?.map(Axis::word);
                 (format!("`axes = {words:?}`"), mended.sections_of(mend))
             }
+            Mend::Scale(_) => {
+                let scale = mended.bodies_of(mend).first().and_then(|s| s.scale)?;
+                (format!("`scale = {scale}`"), mended.sections_of(mend))
+            }
+            Mend::OrientationAxes(matrix) => {
+                let words = axes_of(matrix)?.map(Axis::word);
+                (format!("`orientation_axes = {words:?}`"), mended.sections_of(mend))
+            }
             Mend::Inverted | Mend::TipInverted => ("`invert = true`".to_owned(), mended.sections_of(mend)),
         };
         Some(format!("{key} under {of}"))
@@ -225,7 +247,7 @@ impl Streams {
     }
 
     fn bodies_of(&mut self, mend: &Mend) -> Vec<&mut PoseStream> {
-        let standing = matches!(mend, Mend::Axes(_) | Mend::Inverted);
+        let standing = matches!(mend, Mend::Axes(_) | Mend::Inverted | Mend::Scale(_));
         let markers = !matches!(mend, Mend::TipInverted);
         let still = [&mut self.base, &mut self.table].into_iter().flatten().filter(|_| standing);
         let moving = self.bodies.values_mut().filter(|_| markers);

@@ -257,6 +257,9 @@ pub struct PoseStream {
     /// Unit of the positions; default `m`.
     #[serde(default)]
     pub unit: LengthUnit,
+    /// What positions are multiplied by, as of a fiducial that is smaller than was declared; 1 when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
     /// Which of the published axes, with its sign, is x, y and z of the position: `["x", "-z", "y"]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<[Axis; 3]>,

@@ -127,7 +127,11 @@ impl Inflater {
 
 /// Reads at most one byte more than `size`, so that too much is noticed and a bomb is not inflated. The buffer grows to
 /// twice what has been read, and never beyond what is asked for.
-fn stream_into(buffer: &mut Vec<u8>, mut reader: impl std::io::Read, size: usize) -> Result<(), String> {
+pub(crate) fn stream_into(
+    buffer: &mut Vec<u8>,
+    mut reader: impl std::io::Read,
+    size: usize,
+) -> Result<(), String> {
     buffer.clear();
     let limit = size + 1;
     while buffer.len() < limit {

@@ -353,13 +353,6 @@ fn body_range(record: &RawRecord<'_>) -> Range<usize> {
 
 /// Says why bytes are not the start of an MCAP file.
 pub(crate) fn check_magic(bytes: &[u8]) -> Result<(), String> {
-    if bytes.starts_with(mcap::MAGIC) {
-        return Ok(());
-    }
-    Err(match bytes {
-        b if b.starts_with(b"#ROSBAG") => {
-            "it is a ROS 1 bag; convert it with `mcap convert in.bag out.mcap`".into()
-        }
-        _ => "it does not start with the MCAP magic bytes".into(),
-    })
+    let is_mcap = bytes.starts_with(mcap::MAGIC);
+    is_mcap.then_some(()).ok_or_else(|| "it does not start with the MCAP magic bytes".to_owned())
 }

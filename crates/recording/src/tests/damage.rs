@@ -228,7 +228,7 @@ fn what_is_no_mcap_is_refused_with_its_name() {
     };
     assert!(refused(b"").contains("empty"));
     assert!(refused(b"certainly not a recording").contains("magic"));
-    assert!(refused(b"#ROSBAG V2.0\nxxxx").contains("mcap convert"));
+    assert!(refused(b"#ROSBAG V1.2\nxxxx").contains("rosbag fix"));
     assert!(refused(b"SQLite format 3\0xxx").contains("not a database"));
     assert!(refused(&[0x28, 0xb5, 0x2f, 0xfd, 0, 0]).contains("compressed"));
     let disk = OnDisk::new(&[]);

@@ -239,15 +239,16 @@ fn errors_message(s: &ErrorStats) -> proto::Errors {
 }
 
 fn clock_alignment(c: &ClockAlignment, recording: &str, index: usize, time_ns: i64) -> proto::ClockAlignment {
+    let [offset_s, offset_sigma_s] = c.first_offset_s();
     proto::ClockAlignment {
         timestamp: proto_time(time_ns),
         recording: recording.to_owned(),
         recording_index: saturating_u32(index),
-        offset_ms: c.offset_s * 1e3,
-        offset_sigma_ms: c.offset_sigma_s * 1e3,
+        offset_ms: offset_s * 1e3,
+        offset_sigma_ms: offset_sigma_s * 1e3,
         drift_ppm: c.drift * 1e6,
         drift_sigma_ppm: c.drift_sigma * 1e6,
-        reference: proto_time(c.reference_ns),
+        reference: proto_time(c.first_ns),
         correlation: c.correlation,
         displacement_ratio: c.displacement_ratio,
     }

@@ -212,6 +212,7 @@ mod tests {
             drift: 5e-5,
             drift_sigma: 0.0,
             reference_ns: 1_700_000_000_000_000_000,
+            first_ns: 1_700_000_000_000_000_000,
             correlation: 1.0,
             displacement_ratio: 1.0,
             declared: false,

@@ -192,6 +192,7 @@ fn recording_run(
             drift: 4e-6,
             drift_sigma: 1e-6,
             reference_ns: EPOCH_NS,
+            first_ns: EPOCH_NS,
             correlation: 0.998,
             displacement_ratio: 1.003,
             declared: false,

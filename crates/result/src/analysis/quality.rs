@@ -49,12 +49,15 @@ fn recording_quality(run: &Run, r: &RecordingRun) -> RecordingQuality {
         occluded: r.report.streams.iter().map(|s| s.occluded.total()).sum(),
         damaged: saturating_u32(r.report.files.iter().map(|f| f.damaged.len()).sum()),
         warnings: saturating_u32(r.all_warnings().len()),
-        clock_offset_ms: r.clock.as_ref().and_then(|c| finite(c.offset_s * 1e3).map(round_significant)),
+        clock_offset_ms: r
+            .clock
+            .as_ref()
+            .and_then(|c| finite(c.first_offset_s()[0] * 1e3).map(round_significant)),
         clock_offset_sigma_ms: r
             .clock
             .as_ref()
             .filter(|c| !c.declared)
-            .and_then(|c| finite(c.offset_sigma_s * 1e3).map(round_significant)),
+            .and_then(|c| finite(c.first_offset_s()[1] * 1e3).map(round_significant)),
         clock_drift_ppm: r.clock.as_ref().and_then(|c| finite(c.drift * 1e6).map(round_significant)),
         clock_correlation: r.clock.as_ref().and_then(|c| finite(c.correlation).map(round_significant)),
     }

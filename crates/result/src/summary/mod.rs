@@ -88,7 +88,7 @@ pub struct RecordingSummary<'a> {
     pub clock_drift_ppm: Option<f64>,
     /// Its standard error.
     pub clock_drift_sigma_ppm: Option<f64>,
-    /// Sensor time at which the offset holds.
+    /// Sensor time at which the offset holds: its first stamp.
     pub clock_reference_ns: Option<i64>,
     /// What the stages want to be known about it.
     pub warnings: Vec<&'a Warning>,

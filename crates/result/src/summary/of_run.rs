@@ -36,11 +36,11 @@ impl<'a> RecordingSummary<'a> {
                 .enumerate()
                 .map(|(i, d)| place_summary(d, r.assignments().get(i)))
                 .collect(),
-            clock_offset_ms: r.earlier.is_none().then(|| clock.map_or(0.0, |c| c.offset_s * 1e3)),
-            clock_offset_sigma_ms: estimated.map(|c| c.offset_sigma_s * 1e3),
+            clock_offset_ms: r.earlier.is_none().then(|| clock.map_or(0.0, |c| c.first_offset_s()[0] * 1e3)),
+            clock_offset_sigma_ms: estimated.map(|c| c.first_offset_s()[1] * 1e3),
             clock_drift_ppm: clock.map(|c| c.drift * 1e6),
             clock_drift_sigma_ppm: estimated.map(|c| c.drift_sigma * 1e6),
-            clock_reference_ns: clock.map(|c| c.reference_ns),
+            clock_reference_ns: clock.map(|c| c.first_ns),
             warnings: r.all_warnings(),
         })
     }

@@ -10,6 +10,7 @@ use armcal_core::{Code, Parameter, Unit};
 use armcal_model::{EffectSpec, EffectTable, Override};
 use armcal_stages::{Change, Inputs};
 use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
 
 const RATIO: &str = "mend `counts_per_turn` in [streams.joints], or divide by the gear's ratio in the driver";
 const COUPLED: &str = "convert it in the driver that records it, or read the joint's own angle";
@@ -17,6 +18,7 @@ const FREE: &str = "leave out `free = false`, or mend the values that are held f
 const FIXED: &str = "free it in the model file, or mend its value there";
 const PRIORS: &str = "mend the values in the model file, or widen the deviation that it allows";
 
+const UNIT: &str = "publish radians, or give the factor of the unit";
 const RANGE: &str = "publish angles, or give the factor of the unit";
 
 /// Scales that all joints may have in common, the first and the last only as neighbours, and what no gear is off by.
@@ -62,18 +64,30 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
             }));
         }
     }
-    all.extend(shares_of_ranges(inputs));
-    let n = names.len();
-    all.extend(Hypothesis::of_each(&COMMON_SCALES, 1.0, FAR_COMMON_SCALE, move |scale| {
-        let change = format!("{scale:.4} times the readings of all joints (a unit that they have in common)");
-        scaled_readings("all joints".to_owned(), change, RANGE, n, (0..n).collect(), scale)
-    }));
     for j in 0..names.len() {
         let change = format!("the gear ratio of {} estimated", joint(j));
         let spec = EffectSpec::new("gear_ratio").at(j);
         let scale = ("scale", bounded_amplitude(RATIO_BOUND));
         all.push(effect_hypothesis(Code::JointScale, joint(j), change, RATIO, spec, scale, RATIO_OFF));
     }
+    all
+}
+
+/// Units that all joints have in common: shares of their ranges, and any scale.
+pub fn common_units(inputs: &Inputs) -> Vec<Hypothesis> {
+    let n = inputs.chain.joint_names().len();
+    let mut all = shares_of_ranges(inputs);
+    let everyone = || (0..n).collect();
+    for (unit, factor) in
+        [("turns", TAU), ("gon, read as radians", PI / 200.0), ("gon, read as degrees", 0.9)]
+    {
+        let change = format!("the readings of all joints taken for {unit}");
+        all.push(scaled_readings("all joints".to_owned(), change, UNIT, n, everyone(), factor));
+    }
+    all.extend(Hypothesis::of_each(&COMMON_SCALES, 1.0, FAR_COMMON_SCALE, move |scale| {
+        let change = format!("{scale:.4} times the readings of all joints (a unit that they have in common)");
+        scaled_readings("all joints".to_owned(), change, RANGE, n, (0..n).collect(), scale)
+    }));
     all
 }
 

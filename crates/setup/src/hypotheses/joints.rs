@@ -22,14 +22,7 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     let joint = |j: usize| format!("joint {} ({})", j + 1, names[j]);
     let mut all = Vec::new();
     all.extend(sign_sets(n).into_iter().map(|set| sign_reversal(names, set)));
-    for order in joint_orders(n) {
-        let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
-        let change = format!("the joints read in the order {}", words.join(", "));
-        let mend = Mend::Order(order.clone());
-        let reorder_all = move |i: &mut Inputs| i.each_dwell(|d| reorder(d, &order));
-        let hypothesis = Hypothesis::new(Code::JointOrder, "order of the joints", change, ORDER, reorder_all);
-        all.push(hypothesis.mended_by(mend));
-    }
+    all.extend(joint_orders(n).into_iter().map(|order| in_order(names, order)));
     for (factor, words) in [
         (1.0 / DEGREES, "read as degrees instead of radians"),
         (DEGREES, "read as radians instead of degrees"),
@@ -59,6 +52,20 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         }
     }
     all
+}
+
+fn in_order(names: &[String], order: Vec<usize>) -> Hypothesis {
+    let words: Vec<&str> = order.iter().map(|j| names[*j].as_str()).collect();
+    let change = format!("the joints read in the order {}", words.join(", "));
+    let mend = Mend::Order(order.clone());
+    let reorder_all = move |i: &mut Inputs| i.each_dwell(|d| reorder(d, &order));
+    Hypothesis::new(Code::JointOrder, "order of the joints", change, ORDER, reorder_all).mended_by(mend)
+}
+
+/// Three joints read in turn for each other, and all of them slipped by more than one place. Rarer.
+pub fn cycles(inputs: &Inputs) -> Vec<Hypothesis> {
+    let names = inputs.chain.joint_names();
+    cyclic_orders(names.len()).into_iter().map(|order| in_order(names, order)).collect()
 }
 
 /// The readings of some of `n` joints times a factor.
@@ -124,6 +131,22 @@ fn joint_orders(n: usize) -> Vec<Vec<usize>> {
     once
 }
 
+/// Orders of many joints that are none of [`joint_orders`]: three of them in turn, all by some places.
+fn cyclic_orders(n: usize) -> Vec<Vec<usize>> {
+    let known = joint_orders(n);
+    let mut all: Vec<Vec<usize>> = Vec::new();
+    for (a, b, c) in (0..n).flat_map(|a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| (a, b, c)))) {
+        for turn in [[b, c, a], [c, a, b]] {
+            let mut order: Vec<usize> = (0..n).collect();
+            [a, b, c].iter().zip(turn).for_each(|(to, from)| order[*to] = from);
+            all.push(order);
+        }
+    }
+    all.extend((2..n.saturating_sub(1)).map(|by| (0..n).map(|j| (j + by) % n).collect()));
+    all.retain(|order| !known.contains(order));
+    all
+}
+
 pub fn scale_reading(d: &mut Dwell, j: usize, factor: f64) {
     d.joint_rad[j] *= factor;
     d.joint_sigma_rad[j] *= factor.abs();
@@ -166,6 +189,9 @@ mod tests {
         assert_eq!(joint_orders(3).len(), 5);
         assert_eq!(sign_sets(3).len(), 7);
         assert_eq!(joint_orders(6).len(), 15 + 3);
-        assert!(joint_orders(1).is_empty());
+        assert!(joint_orders(1).is_empty() && cyclic_orders(3).is_empty());
+        // Two turns of each of the twenty threes, and slips by two, three and four places.
+        assert_eq!(cyclic_orders(6).len(), 2 * 20 + 3);
+        assert!(cyclic_orders(6).contains(&vec![1, 2, 0, 3, 4, 5]));
     }
 }

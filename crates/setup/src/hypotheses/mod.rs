@@ -185,8 +185,8 @@ impl Hypothesis {
 }
 
 /// Everything worth trying on these inputs, what is rarer apart: to be tried where nothing of the first explains the errors.
-/// `at_bound` are parameters that the fit left on their bounds.
-pub fn hypotheses_by_rarity(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hypothesis>; 2] {
+/// `at_bound` are parameters that the fit left on their bounds, `gross` whether it knows hardly more of the arm than where it is.
+pub fn hypotheses_by_rarity(inputs: &Inputs, at_bound: &[Parameter], gross: bool) -> [Vec<Hypothesis>; 2] {
     let mut all = joints::hypotheses(inputs);
     all.extend(poses::hypotheses(inputs));
     all.extend(readings::hypotheses(inputs));
@@ -195,10 +195,15 @@ pub fn hypotheses_by_rarity(inputs: &Inputs, at_bound: &[Parameter]) -> [Vec<Hyp
     all.extend(frames::hypotheses(inputs));
     let mut rarer = parts::hypotheses(inputs, &all);
     rarer.extend(drives::hypotheses(inputs));
-    rarer.extend(zeros::hypotheses(inputs, at_bound));
+    rarer.extend(zeros::hypotheses(inputs, at_bound, gross));
     rarer.extend(drives::let_go(inputs));
     rarer.extend(model::of_another_size(inputs));
-    rarer.extend(model::of_another_axis(inputs));
+    if gross {
+        rarer.extend(drives::common_units(inputs));
+        rarer.extend(joints::cycles(inputs));
+        rarer.extend(poses::other_sizes(inputs));
+        rarer.extend(model::of_another_axis(inputs));
+    }
     rarer.extend(board::from_the_other_side(inputs));
     [all, rarer]
 }

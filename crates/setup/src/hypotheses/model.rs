@@ -1,7 +1,7 @@
 //! The nominal arm: rows with another sign, lengths and angles in other units, a parameter far beyond its bounds.
 
 use super::joints::ZERO;
-use super::{Estimated, Freedom, Hypothesis};
+use super::{Estimated, Freedom, Hypothesis, Mending};
 use armcal_config::Measure;
 use armcal_core::units::DEGREES;
 use armcal_core::{Against, Code, Parameter, Unit};
@@ -103,14 +103,18 @@ pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
     }
     for p in at_bound {
         let own = p.name.clone();
-        let joint = inputs.chain.joint_names().iter().find(|joint| p.name == format!("{joint}.theta"));
+        let names = inputs.chain.joint_names();
+        let is_zero = |j: &usize| inputs.chain.joint_zero(*j).is_some_and(|(zero, _)| zero.name == p.name);
+        let joint = (0..names.len()).find(is_zero);
         let (code, subject, remedy) = match joint {
-            Some(joint) => (Code::JointZero, format!("the zero of {joint} ({})", p.name), ZERO),
+            Some(j) => (Code::JointZero, format!("the zero of {} ({})", names[j], p.name), ZERO),
             None => (Code::ParameterBound, p.name.clone(), FILE),
         };
+        let mending = joint.map(|j| Mending::zeros(inputs, [j]));
         let change = format!("{subject} free to leave its bounds");
         let hypothesis =
             Hypothesis::new(code, subject, change, remedy, move |i| i.changes.push(widen_bounds(&own)));
+        let hypothesis = Hypothesis { mending, ..hypothesis };
         all.push(hypothesis.estimating(Freedom::Number, vec![Estimated::beyond(p)]));
     }
     if at_bound.len() > 1 {

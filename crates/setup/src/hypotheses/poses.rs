@@ -2,7 +2,7 @@
 //! bodies taken for each other.
 
 use super::Hypothesis;
-use armcal_core::{Code, Mend, Pose};
+use armcal_core::{Code, Mend, Pose, axis_turns, in_axes};
 use armcal_dwell::MeanPose;
 use armcal_stages::Inputs;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -15,6 +15,8 @@ const CAMERAS: &str = "calibrate the cameras anew, or mend what scales their pos
 /// by one in a hundred at most.
 const SCALES: [f64; 9] = [0.8, 0.9, 0.95, 0.98, 1.0, 1.02, 1.05, 1.1, 1.2];
 const FAR_SCALE: f64 = 0.012;
+/// The same of a fiducial whose size was declared wrongly.
+const SIZES: [f64; 11] = [0.2, 0.33, 0.5, 0.7, 0.8, 1.0, 1.2, 1.45, 2.0, 3.0, 5.0];
 
 /// One of the bodies that stand still.
 #[derive(Clone, Copy)]
@@ -79,14 +81,16 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
         }
         if oriented {
             let change = format!("the quaternion of the tip {words}");
-            all.push(Hypothesis::new(code, "the tip", change, STREAMS, move |i| {
-                i.each_dwell(|d| {
-                    if let Some(q) = d.tip.as_mut().and_then(|t| t.orientation.as_mut()) {
-                        *q = turned(*q);
-                    }
-                });
-            }));
+            let turn = move |i: &mut Inputs| turn_tips(i, turned);
+            all.push(Hypothesis::new(code, "the tip", change, STREAMS, turn));
         }
+    }
+    // The first turns nothing.
+    for turn in axis_turns().into_iter().skip(1).filter(|_| oriented) {
+        let change = "the orientation of the tip taken in other axes than its position";
+        let take = move |i: &mut Inputs| turn_tips(i, |q| in_axes(&turn, &q));
+        let hypothesis = Hypothesis::new(Code::AxesPermuted, "the tip", change, STREAMS, take);
+        all.push(hypothesis.mended_by(Mend::OrientationAxes(turn)));
     }
     for (body, present, name) in [(Body::Base, base, "the base"), (Body::Table, table, "the table")] {
         for (turn, words) in [(FRAC_PI_2, "y up"), (-FRAC_PI_2, "y down")].into_iter().filter(|_| present) {
@@ -131,11 +135,17 @@ pub fn hypotheses(inputs: &Inputs) -> Vec<Hypothesis> {
     all
 }
 
+/// Lengths of the sensor that are far from metres, as of a fiducial of another size. Rarer.
+pub fn other_sizes(inputs: &Inputs) -> Vec<Hypothesis> {
+    let seen = inputs.dwells().any(|d| d.tip.is_some());
+    let all = Hypothesis::of_each(&SIZES, 1.0, FAR_SCALE, scaled_positions);
+    all.into_iter().filter(|_| seen).collect()
+}
+
 fn scaled_positions(scale: f64) -> Hypothesis {
     let change = format!("the sensor's lengths {scale:.4} times as large");
-    Hypothesis::new(Code::PositionScale, "positions", change, CAMERAS, move |i| {
-        map_positions(i, Matrix3::identity() * scale, false);
-    })
+    let take = move |i: &mut Inputs| map_positions(i, Matrix3::identity() * scale, false);
+    Hypothesis::new(Code::PositionScale, "positions", change, CAMERAS, take).mended_by(Mend::Scale(scale))
 }
 
 fn tip_orientation(d: &armcal_core::Dwell) -> Option<UnitQuaternion<f64>> {
@@ -204,9 +214,13 @@ fn invert_tips(inputs: &mut Inputs) {
     });
 }
 
-/// A reflection M maps a rotation R to M R M'.
-fn map_rotation(matrix: &Matrix3<f64>, q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_matrix(&(matrix * q.to_rotation_matrix().matrix() * matrix.transpose()))
+/// Orientations of the tip, each turned.
+fn turn_tips(inputs: &mut Inputs, turned: impl Fn(UnitQuaternion<f64>) -> UnitQuaternion<f64>) {
+    inputs.each_dwell(|d| {
+        if let Some(q) = d.tip.as_mut().and_then(|t| t.orientation.as_mut()) {
+            *q = turned(*q);
+        }
+    });
 }
 
 /// Maps what the sensor saw of the arm.
@@ -216,7 +230,7 @@ fn map_tips(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) {
             tip.position_m = matrix * tip.position_m;
             tip.covariance_m2 = matrix * tip.covariance_m2 * matrix.transpose();
             if orientations {
-                tip.orientation = tip.orientation.map(|q| map_rotation(&matrix, q));
+                tip.orientation = tip.orientation.map(|q| in_axes(&matrix, &q));
             }
         }
     });
@@ -229,7 +243,7 @@ fn map_positions(inputs: &mut Inputs, matrix: Matrix3<f64>, orientations: bool) 
         map_bodies(inputs, body, |p| {
             p.pose.translation.vector = matrix * p.pose.translation.vector;
             if orientations {
-                p.pose.rotation = map_rotation(&matrix, p.pose.rotation);
+                p.pose.rotation = in_axes(&matrix, &p.pose.rotation);
             }
         });
     }

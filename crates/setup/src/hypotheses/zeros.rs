@@ -31,13 +31,13 @@ const FAR_ZERO_RAD: f64 = 0.1;
 /// What moved between recordings by less is a slip by a tooth of a belt (2.8 deg of 128), which the diagnosis names [rad].
 const SLIPPED_RAD: f64 = 0.055;
 
-pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter]) -> Vec<Hypothesis> {
+pub fn hypotheses(inputs: &Inputs, at_bound: &[Parameter], gross: bool) -> Vec<Hypothesis> {
     let n = inputs.chain.joint_names().len();
     let turning: Vec<usize> = (0..n).filter(|&j| inputs.chain.joint_unit(j) == Unit::Radian).collect();
     let mut all = by_quarters(inputs, &turning);
     all.extend(turning.iter().flat_map(|&j| by_any_angle(inputs, j)));
     all.extend(between_recordings(inputs, &turning));
-    all.extend(all_zeros(inputs, at_bound));
+    all.extend(all_zeros(inputs, at_bound, gross));
     all
 }
 
@@ -148,12 +148,16 @@ fn homing_times(inputs: &Inputs) -> Vec<(Since, String)> {
     recording_ranges(inputs).into_iter().map(|(part, words)| (since(part), words)).collect()
 }
 
-/// The zeros of all joints, where more than one of them is on its bound.
-fn all_zeros(inputs: &Inputs, at_bound: &[Parameter]) -> Option<Hypothesis> {
+/// The zeros of all joints, where one of them is on its bound, or hardly anything fits.
+fn all_zeros(inputs: &Inputs, at_bound: &[Parameter], gross: bool) -> Option<Hypothesis> {
     let zeros = zero_names(inputs);
-    let far: Vec<Estimated> =
-        at_bound.iter().filter(|p| zeros.contains(&p.name)).map(Estimated::beyond).collect();
-    (far.len() > 1).then(|| {
+    let is_zero = |p: &&Parameter| zeros.contains(&p.name);
+    let mut far: Vec<Estimated> = at_bound.iter().filter(is_zero).map(Estimated::beyond).collect();
+    if far.is_empty() && gross {
+        let all = inputs.chain.parameters().iter().filter(is_zero);
+        far = all.map(|p| Estimated::of(p, FAR_ZERO_RAD)).collect();
+    }
+    (!far.is_empty()).then(|| {
         let change = "the zeros of all joints free to leave their bounds";
         let mending = Some(Mending::zeros(inputs, 0..inputs.chain.joint_names().len()));
         let widen = move |i: &mut Inputs| i.changes.extend(zeros.iter().map(|name| widen_bounds(name)));
