@@ -3,6 +3,7 @@
 use crate::init::{changed, held_out_mm};
 use armcal_lab::config::LabConfig;
 use armcal_lab::sensors::{Log, Payload};
+use std::f64::consts::TAU;
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -43,15 +44,17 @@ fn zeros_between(log: &mut Log) {
 #[test]
 fn what_can_be_undone_is_undone_and_said() {
     let sign = |log: &mut Log| joints(log, |q| q[1] = -q[1]);
-    let zero = |log: &mut Log| joints(log, |q| q[2] += 1.5 * std::f64::consts::PI);
+    let zero = |log: &mut Log| joints(log, |q| q[2] += 0.75 * TAU);
+    let turns = |log: &mut Log| joints(log, |q| q.iter_mut().for_each(|q| *q /= TAU));
     let set = |log: &mut Log| stamps(log, |t| if t < 40 * SECOND { t } else { t - 1_300_000_000 });
     let epoch = |log: &mut Log| stamps(log, |t| t - 1_650_000_000 * SECOND);
     let rate = |log: &mut Log| stamps(log, |t| t * 6 / 5);
     type Change<'a> = (&'a dyn Fn(&mut Log), &'a str);
-    let cases: [Change<'_>; 7] = [
+    let cases: [Change<'_>; 8] = [
         (&|_| (), "[streams.tip]"),
         (&sign, "factors = [1.0, -1.0, 1.0]"),
         (&zero, "zeros_deg = [0.0, 0.0, 90.0]"),
+        (&turns, "factors = [6.283185, 6.283185, 6.283185]"),
         (&set, "header stamps step by -1.300 s"),
         (&epoch, "initial_offset_s = -165"),
         (&rate, "their clock runs 1.2000 times as fast"),

@@ -1,7 +1,7 @@
 //! What the recordings say of each body: how far it went, where it was in every pause of the arm, which link it followed.
 
 use super::arm::Arm;
-use super::motion::{Likeness, Speeds, compare_speeds};
+use super::motion::{Likeness, Speeds, compare_speeds, speed_ratio};
 use super::read::{AllRead, Read};
 use armcal_core::robust::{median, percentile};
 use armcal_core::{Pose, PoseSamples};
@@ -9,6 +9,7 @@ use armcal_dwell::mean_pose;
 use armcal_stages::CLOCK_RATES;
 use armcal_stages::links::{Placed, place_on_link, turned_apart};
 use nalgebra::{UnitQuaternion, Vector3};
+use std::f64::consts::TAU;
 
 /// Noise of positions [m] and turns [rad] below which no link is better than another.
 const OFF_M: f64 = 2e-3;
@@ -183,6 +184,32 @@ pub fn clock_rates(arm: &Arm, read: &AllRead, evidence: &[Evidence]) -> Vec<(usi
     (0..evidence.len()).filter_map(rate).collect()
 }
 
+/// Whether the joints are read in turns: the body that moves most like the arm moves so many times as fast, and as fast and no less
+/// alike once they are taken for that.
+pub fn in_turns(arm: &Arm, read: &AllRead, evidence: &[Evidence]) -> bool {
+    let nominal = arm.model.nominal();
+    let likeness = |at: usize| evidence[at].likeness().map_or(0.0, |l| l.correlation);
+    let Some(at) = (0..evidence.len()).max_by(|a, b| likeness(*a).total_cmp(&likeness(*b))) else {
+        return false;
+    };
+    let mut seen = read.recordings.iter().filter_map(|r| Some((&r.samples.joints, r.body(at)?)));
+    let Some((joints, seen)) = seen.next().filter(|_| likeness(at) > UNLIKE) else { return false };
+    let body = Speeds::of(&seen.time_ns, |i| seen.position_m[i]);
+    let with = |factor: f64| {
+        let row = |i: usize| joints.row_rad(i).iter().map(|q| factor * q).collect::<Vec<f64>>();
+        let tip_m = |i: usize| arm.model.tip_in_base(&nominal, &row(i)).translation.vector;
+        let speeds = Speeds::of(&joints.time_ns, tip_m);
+        let likeness = compare_speeds(&speeds, &body)?;
+        Some((speed_ratio(&speeds, &body, likeness.delay_s), likeness.correlation))
+    };
+    let near = |ratio: f64, unit: f64| (ratio / unit).ln().abs() < SAME_SPEED.ln();
+    with(1.0).zip(with(TAU)).is_some_and(|((ratio, as_read), (in_turns, alike))| {
+        near(ratio, TAU) && near(in_turns, 1.0) && alike >= as_read
+    })
+}
+
+/// A body moves at the speed of the arm within this factor, wherever on its end it is.
+const SAME_SPEED: f64 = 1.4;
 /// Speeds that are no more alike than this are not of one motion; those that are more alike than that surely are.
 const UNLIKE: f64 = 0.5;
 const SURELY_ALIKE: f64 = 0.85;

@@ -47,6 +47,7 @@ use armcal_stages::preprocess;
 use armcal_stages::{Inputs, Silent, Steps};
 use armcal_table::Board;
 use known::Known;
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 /// Mistakes that are undone one after the other.
@@ -126,6 +127,16 @@ struct Taken {
     noise_mm: Option<f64>,
 }
 
+impl Taken {
+    /// The same with all joints read in turns.
+    fn in_turns(&self, mut streams: Streams, joints: usize) -> Taken {
+        streams.mend(&Mend::Readings { factors: vec![TAU; joints], zeros_rad: vec![0.0; joints] });
+        let why = "the readings of all joints are turns: the body moves 2 pi times as far as with radians; `factors` under \
+                   [streams.joints] undoes it";
+        Taken { mended: Some(streams), why: vec![why.to_owned()], ..self.clone() }
+    }
+}
+
 fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<Proposal, InitError> {
     progress.step("opening the recordings");
     let opened = files::open_all(&asked.inputs, &asked.out)?;
@@ -164,6 +175,9 @@ fn propose_taken(asked: &Asked, taken: &Taken, progress: &dyn Steps) -> Result<P
     progress.step("comparing motions");
     let board = asked.board.as_deref().map(read_board).transpose()?;
     let mut evidence = evidence::gather(&arm, &read);
+    if taken.mended.is_none() && evidence::in_turns(&arm, &read, &evidence) {
+        return propose_taken(asked, &taken.in_turns(read.streams, arm.names.len()), progress);
+    }
     let rates = evidence::clock_rates(&arm, &read, &evidence);
     if !rates.is_empty() {
         rates.into_iter().for_each(|(body, rate)| read.set_clock_rate(body, rate));

@@ -32,6 +32,13 @@ impl Speeds {
     }
 }
 
+/// How many times as fast the body moves as the arm, where it is as late as that.
+pub fn speed_ratio(arm: &Speeds, body: &Speeds, delay_s: f64) -> f64 {
+    let delay = (delay_s * 1e9 / BIN_NS as f64).round() as i64;
+    let sums = common_bins(&arm.0, &body.0, delay).fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+    sums.1 / sums.0
+}
+
 /// How alike two speeds are, and by how much the second is late [s]: the largest correlation over all delays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Likeness {

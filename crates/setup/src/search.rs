@@ -5,6 +5,7 @@ use super::attempt::{Tried, fit_hypotheses};
 use super::beyond::Physics;
 use super::describe::{Side, describe_gain, moved_frame, scale_with_interval, setup_finding};
 use super::hypotheses::{Freedom, Hypothesis, hypotheses_by_rarity};
+use super::spread::moved_m;
 use super::trial::{Misfit, compute_misfit, for_trials};
 use super::unseen::untestable_sign;
 use super::weigh::{
@@ -63,7 +64,8 @@ fn one_upon_the_other(
         let physics = Physics::of(&now, first.as_ref());
         // Fewer equations than parameters follow any number that is let go.
         let few = first.as_ref().is_some_and(|f| f.calibration.fit.too_few_dwells().is_some());
-        for mut some in hypotheses_by_rarity(&now, &at_bound, is_gross(&before)) {
+        let gross = is_gross(&before, first.as_ref().map_or(0.0, moved_m));
+        for mut some in hypotheses_by_rarity(&now, &at_bound, gross) {
             some.retain(|h| !few || h.freedom == Freedom::Discrete);
             // A frame that is let go takes a share of anything: what is rarer may still fit better.
             if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {

@@ -1,6 +1,7 @@
 //! How large the data are: what a change of a unit or a scale makes of every error, it makes of this.
 
 use armcal_core::{FeatureId, Observation};
+use armcal_stages::Fitted;
 use std::collections::BTreeMap;
 
 /// Root mean square distance of measured positions from their mean [m]: those that a sensor saw of each tip or marker in the
@@ -22,6 +23,22 @@ pub fn spread_m(observations: &[Observation]) -> f64 {
         (0..points[0].len()).map(along).sum()
     };
     (all.values().map(from_mean_m2).sum::<f64>() / observations.len().max(1) as f64).sqrt()
+}
+
+/// Root mean square way [m] of what was measured if each joint alone were held at its mean reading: what a joint that is taken
+/// for another may err by. Dwells in one place, come to with other joints each time, move by far more than they spread.
+pub fn moved_m(fitted: &Fitted) -> f64 {
+    let (model, all) = (&fitted.model, &fitted.observations);
+    let n = all.len().max(1) as f64;
+    let mean_of = |j: usize| all.iter().map(|o| o.joint_rad[j]).sum::<f64>() / n;
+    let means_rad: Vec<f64> = (0..model.joint_count()).map(mean_of).collect();
+    let nominal = model.nominal();
+    let of_dwell = |o: &Observation| -> f64 {
+        let jacobian = model.joint_jacobian(&nominal, o);
+        let from_mean_rad = o.joint_rad.iter().zip(&means_rad).map(|(q, mean)| q - mean);
+        jacobian.column_iter().zip(from_mean_rad).map(|(c, by)| c.norm_squared() * by * by).sum()
+    };
+    (all.iter().map(of_dwell).sum::<f64>() / n).sqrt()
 }
 
 #[cfg(test)]

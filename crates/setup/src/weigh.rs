@@ -16,7 +16,8 @@ pub const SAME_FACTOR: f64 = 1.05;
 const FRAMES_FROM: f64 = 5.0;
 /// A model that predicts the mean of what was measured, whatever the joints do, errs by this much of its spread.
 const KNOWS_NOTHING: f64 = 1.0;
-/// What errs by more than this share of the spread may have joints in no unit of angles, or an axis that is another.
+/// What errs by more than this share of the way that the joints move it may have joints in no unit of angles, or an axis that
+/// is another.
 const GROSS: f64 = 0.03;
 /// Errors within this many times the floor leave nothing to explain.
 const NOTHING_LEFT: f64 = 1.2;
@@ -40,9 +41,9 @@ pub fn in_doubt(m: &Misfit) -> bool {
     m.mean_m.is_infinite() || m.times_floor() >= WORTH_LOOKING || homeless
 }
 
-/// Whether the errors are so large a share of what was measured that the arm may hardly be the one that was moved.
-pub fn is_gross(m: &Misfit) -> bool {
-    m.of_spread() > GROSS
+/// Whether the errors are so large a share of the way that each joint alone moves the arm that it may hardly be this one.
+pub fn is_gross(m: &Misfit, moved_m: f64) -> bool {
+    m.mean_m > GROSS * moved_m
 }
 
 /// Whether a change divides the errors as only the right one does; or lets far more dwells be used, no worse.

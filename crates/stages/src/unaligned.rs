@@ -4,6 +4,7 @@ use crate::readings::LEAP_RAD;
 use crate::still::{still_tip, value_range};
 use armcal_core::units::DEGREES;
 use armcal_core::{FEW_PER_S, JointSamples, PoseSamples, Samples};
+use std::f64::consts::TAU;
 
 /// With the right reading, the speeds agree like this.
 const AGREES: f64 = 0.97;
@@ -95,6 +96,7 @@ fn of_joints(now: &Reading) -> Vec<(Reading, String)> {
     for (factor, words) in [
         (DEGREES, "radians where degrees are declared"),
         (1.0 / DEGREES, "degrees where radians are declared"),
+        (TAU, "turns where radians are declared"),
     ] {
         let words = format!("[joint-unit] with the joints' readings taken for {words}");
         with_joints(&|s| s.joint_rad.iter_mut().flatten().for_each(|q| *q *= factor), words);

@@ -18,6 +18,7 @@ use armcal_core::robust::percentile;
 use armcal_core::{JointSamples, PoseSamples, Warning};
 use nalgebra::Vector3;
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 
 use crate::series::{check_joints, check_poses, seconds_between};
 use crate::{ClockAlignment, ClockConfig, DwellError};
@@ -466,6 +467,8 @@ fn check_units(ratio: f64, correlation: f64) -> Result<(), DwellError> {
         "its positions look like millimetres: set unit = \"mm\" for the tip stream"
     } else if near(1e-3) {
         "the lengths of the model look like millimetres, or the tip stream is in metres but declared unit = \"mm\""
+    } else if at(TAU) {
+        "the joint stream looks like turns: give each joint 6.283185 in `factors` under [streams.joints]"
     } else if (6.0..200.0).contains(&ratio) {
         "the joint stream looks like radians that are declared unit = \"deg\""
     } else if !(1.0 / 6.0..6.0).contains(&ratio) {
