@@ -116,7 +116,11 @@ pub fn frame_displacement(now: &Inputs, code: Code, from: &Fitted, to: &Fitted) 
 /// What happens to an arm at one moment: a tool or frame is shifted, a zero slips.
 fn event_effects(now: &Inputs) -> Vec<String> {
     let zeros = (1..=now.chain.joint_names().len()).map(|j| format!("zero_slip:{j}"));
-    ["tool_shift", "frame_shift", "board_shift"].map(str::to_owned).into_iter().chain(zeros).collect()
+    ["tool_shift", "tip_marker_shift", "frame_shift", "board_shift"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(zeros)
+        .collect()
 }
 
 fn times_floor(now: &Inputs, since: &str) -> Option<f64> {

@@ -16,6 +16,7 @@ mod beyond;
 mod describe;
 mod facts;
 mod hypotheses;
+mod moving;
 mod search;
 mod spread;
 mod trial;

@@ -5,6 +5,7 @@ use super::attempt::{Tried, fit_hypotheses};
 use super::beyond::Physics;
 use super::describe::{Side, describe_gain, moved_frame, scale_with_interval, setup_finding};
 use super::hypotheses::{Freedom, Hypothesis, hypotheses_by_rarity};
+use super::moving::Moving;
 use super::spread::moved_m;
 use super::trial::{Misfit, compute_misfit, for_trials};
 use super::unseen::untestable_sign;
@@ -14,6 +15,7 @@ use super::weigh::{
 };
 use armcal_core::{Certainty, Parameter, Role, SetupFinding, SetupReport};
 use armcal_stages::{Fitted, Inputs};
+use rayon::prelude::*;
 
 /// Mistakes one upon the other.
 const MOST_MISTAKES: usize = 3;
@@ -64,9 +66,12 @@ fn one_upon_the_other(
         let physics = Physics::of(&now, first.as_ref());
         // Fewer equations than parameters follow any number that is let go.
         let few = first.as_ref().is_some_and(|f| f.calibration.fit.too_few_dwells().is_some());
+        let moving = first.as_ref().and_then(|fitted| Moving::of(&now, fitted, &before));
         let gross = is_gross(&before, first.as_ref().map_or(0.0, moved_m));
         for mut some in hypotheses_by_rarity(&now, &at_bound, gross) {
             some.retain(|h| !few || h.freedom == Freedom::Discrete);
+            let worth = |h: &Hypothesis| moving.as_ref().is_none_or(|m| !m.goes_too_far(h));
+            some = some.into_par_iter().filter(worth).collect();
             // A frame that is let go takes a share of anything: what is rarer may still fit better.
             if tried.iter().all(|t: &Tried| t.hypothesis.freedom == Freedom::Frame) {
                 report.tried += some.len();

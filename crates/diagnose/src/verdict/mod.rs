@@ -39,7 +39,7 @@ const SIGMA_RATIO: f64 = 1.4;
 /// So is noise that much below it.
 const OVERDECLARED: f64 = 2.0;
 /// Families that displace what is measured, whatever the joints do.
-const SHIFTS: [&str; 3] = ["tool_shift", "frame_shift", "marker_shift"];
+const SHIFTS: [&str; 4] = ["tool_shift", "frame_shift", "marker_shift", "tip_marker_shift"];
 
 /// Diagnoses a problem. `refit` gives it, and gives it again with effects in the base model.
 pub fn diagnose_problem(refit: &mut dyn Refit, config: &DiagnosisConfig) -> Result<Diagnosis, DiagnoseError> {

@@ -20,6 +20,7 @@
 //! | `axis_tilt` | an axis is not parallel to the one before | `joint`, `tilt_deg` |
 //! | `zero_slip` | a pulley slips on its shaft | `joint`, `slip_deg`, `recording`, `at_s`, `until_s` |
 //! | `bump` | tool, marker, base, board or cameras are knocked | `body`, `marker`, `shift_mm`, `turn_deg`, `recording`, `at_s`, `until_s` |
+//! | `marker_sag` | the markers of the tip hang on a stalk that bends | `sag_mm`, `stalk` |
 //! | `thermal_growth` | links follow the thermometer | `links`, `per_kelvin_ppm` |
 //! | `warm_up` | links are heated by motors the thermometer does not see | `links`, `per_kelvin_ppm`, `rise_k`, `time_constant_s` |
 //! | `lag` | a joint that approaches its drive exponentially | `joint`, `time_constant_s` |
@@ -62,6 +63,7 @@ mod gear;
 mod heat;
 mod lag;
 mod link_bending;
+mod marker_sag;
 mod shapes;
 mod twist;
 mod waves;
@@ -85,6 +87,7 @@ pub use gap::Gap;
 pub use heat::{RoomTemperature, ThermalGrowth, WarmUp};
 pub use lag::Lag;
 pub use link_bending::LinkBending;
+pub use marker_sag::MarkerSag;
 pub use shapes::{DamagedTeeth, GearRatio, Sawtooth, SecondHarmonic, SoftStop, ToothRunout};
 pub use twist::Twist;
 pub use waves::{Wave, Waves};
@@ -153,6 +156,7 @@ mechanisms!(
     axis_tilt: AxisTilt,
     zero_slip: ZeroSlip,
     bump: Bump,
+    marker_sag: MarkerSag,
     thermal_growth: ThermalGrowth,
     warm_up: WarmUp,
     zero_drift: ZeroDrift,

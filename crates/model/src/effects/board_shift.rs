@@ -34,7 +34,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     toggle: Toggle::Recording,
     target: Target::Whole,
     offered: Offered::Events,
-    confused_with: &["frame_shift", "tool_shift"],
+    confused_with: &["frame_shift", "tool_shift", "tip_marker_shift"],
     place: effect_placement,
     look_at: "The board slipped on its stand or under its markers: look at its clamps, and measure it again before and after.",
     ..EffectKind::PLAIN

@@ -63,6 +63,9 @@ mod spec;
 mod state;
 mod table;
 mod thermal_growth;
+mod tip_marker_offset;
+mod tip_marker_sag;
+mod tip_marker_shift;
 mod tool_shift;
 mod torque_terms;
 mod undeclared_load;
@@ -131,6 +134,7 @@ static CATALOGUE: &[&EffectKind] = catalogue![
     axis_tilt,
     zero_slip,
     tool_shift,
+    tip_marker_shift,
     marker_shift,
     frame_shift,
     board_shift,
@@ -139,6 +143,8 @@ static CATALOGUE: &[&EffectKind] = catalogue![
     frame_drift,
     thermal_growth,
     warm_up,
+    tip_marker_offset,
+    tip_marker_sag,
     sensor_scale,
     volume_distortion,
     board_scale,

@@ -170,6 +170,12 @@ impl NominalPose {
         }
     }
 
+    /// The direction from where the link at the tip of an arm begins to that tip; none where the two are one.
+    pub fn towards_tip(&self, arm: usize) -> Option<Vector3<f64>> {
+        let tip = &self.hooks[arm];
+        (tip.at_m - self.links[tip.link?].from_m).try_normalize(1e-6)
+    }
+
     /// Length of link `k` to the farthest of its ends [m].
     pub fn length_m(&self, k: usize) -> f64 {
         let link = &self.links[k];

@@ -1,7 +1,7 @@
-//! The tool or its marker moved on the last link.
+//! The tool moved on the last link.
 //!
 //! # What moves
-//! The tool was remounted, bent or knocked; or the marker on it was.
+//! The tool was remounted, bent or knocked; or the marker on it was, where no cavity ever held the tip.
 //!
 //! # Equation
 //! `d tip = (x, y, z)` in the last link, in the recording, or from the dwell on, that the spec names.
@@ -14,7 +14,8 @@
 //!
 //! # Not to be confused with
 //! `zero_slip` of the last joint, to a tip in one plane; `frame_shift`, which does not turn with the arm. A second
-//! marker on the tool separates them.
+//! marker on the tool separates them. `tip_marker_shift`, of which dwells in cavities know nothing: where there are such
+//! dwells and tracked ones the two are told apart.
 //!
 //! # Source
 //! Notes of the project.
@@ -29,7 +30,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     target: Target::Whole,
     offered: Offered::Events,
     shapes: &[ARM],
-    confused_with: &["zero_slip", "frame_shift"],
+    confused_with: &["zero_slip", "frame_shift", "tip_marker_shift"],
     place: effect_placement,
     look_at: "The tool or its markers were remounted, bent or knocked: look at the last link.",
     lookalikes: &[Lookalikes::Moments, Lookalikes::Slow],

@@ -33,10 +33,35 @@ pub fn body_shift(
         BumpedBody::Tool => {
             ("tool_shift", "tip", vec![format!("zero_slip:3{when}"), format!("frame_shift{when}")])
         }
+        BumpedBody::Marker => ("tip_marker_shift", "tip", Vec::new()),
         _ => ("frame_shift", "world", vec![format!("zero_slip:1{when}"), format!("tool_shift{when}")]),
     };
     let enters = [channel.to_owned(), "recording".to_owned()];
     Ok(known_effect(MechanismConfig::Bump(knock), format!("{effect}{when}"), enters).alike(&alike))
+}
+
+/// The markers of the tip are from the first moment on elsewhere than where the model has them.
+pub fn tip_marker_offset(draw: &mut Draw) -> Result<Made, LabError> {
+    let shift_mm: [f64; 3] = (draw.direction() * draw.size).into();
+    let knock = Bump {
+        body: BumpedBody::Marker,
+        marker: None,
+        shift_mm,
+        turn_deg: [0.0; 3],
+        recording: 0,
+        at_s: 0.0,
+        until_s: None,
+    };
+    let enters = ["tip".to_owned(), "seated".to_owned()];
+    Ok(known_effect(MechanismConfig::Bump(knock), "tip_marker_offset".to_owned(), enters))
+}
+
+/// The markers of the tip hang on a stalk that goes on in the direction of the link, more or less.
+pub fn tip_marker_sag(draw: &mut Draw) -> Result<Made, LabError> {
+    let aside = 0.15 * draw.direction();
+    let sag = MarkerSag { sag_mm: draw.size, stalk: [1.0 + aside.x, aside.y, aside.z] };
+    let enters = ["tip".to_owned(), "seated".to_owned()];
+    Ok(known_effect(MechanismConfig::MarkerSag(sag), "tip_marker_sag".to_owned(), enters))
 }
 
 /// Read at the end of its rest, a joint has this share of its last move before it: only where motors drive the arm to
