@@ -368,14 +368,16 @@ fn warnings(
     all
 }
 
-/// Whether something was displaced in some dwells and not after them, and no cavity held the tip in any of these: a fault of the
-/// sensor displaces the same.
+/// Whether something was displaced in some dwells and not after them, and no cavity that held the tip in any of these knows of
+/// it: a fault of the sensor displaces the same.
 fn seen_by_the_sensor_alone(a: &Accepted) -> bool {
     let dwells = &a.conditioned.problem.dwells;
     let shifted = SHIFTS.contains(&a.candidate.family.as_str());
     let during = temporary_since(&a.candidate.spec).filter(|_| shifted);
+    let of_markers = a.candidate.family == "tip_marker_shift";
     during.is_some_and(|during| {
-        dwells.iter().filter(|d| during.holds(d.id)).flat_map(|d| &d.parts).all(|part| part.tracked)
+        of_markers
+            || dwells.iter().filter(|d| during.holds(d.id)).flat_map(|d| &d.parts).all(|part| part.tracked)
     })
 }
 

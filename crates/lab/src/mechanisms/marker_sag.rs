@@ -8,13 +8,13 @@ use super::*;
 pub struct MarkerSag {
     /// How far the markers hang with the stalk held out level [mm].
     pub sag_mm: f64,
-    /// The direction of the stalk in the frame of the tip. Default along its x.
-    #[serde(default = "along_x")]
+    /// The direction of the stalk in the frame of the tip. Default along its y, which is that of the forearm of the paper's arm.
+    #[serde(default = "along_y")]
     pub stalk: [f64; 3],
 }
 
-fn along_x() -> [f64; 3] {
-    [1.0, 0.0, 0.0]
+fn along_y() -> [f64; 3] {
+    [0.0, 1.0, 0.0]
 }
 
 impl Mechanism for MarkerSag {

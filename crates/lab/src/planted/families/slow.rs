@@ -1,6 +1,7 @@
 //! Families of events and drifts, of sensors and boards.
 
 use super::*;
+use crate::checks::value_error;
 use armcal_core::Pose;
 use nalgebra::Point3;
 
@@ -29,15 +30,41 @@ pub fn body_shift(
         if body == BumpedBody::Base { draw.direction() * (0.1 * draw.size) } else { Vector3::zeros() };
     let Event { recording, at_s, until_s, when } = draw.event(config, timing)?;
     let knock = Bump { body, marker: None, shift_mm, turn_deg: turn_deg.into(), recording, at_s, until_s };
+    if body == BumpedBody::Marker {
+        return markers_of_tip(config, knock);
+    }
     let (effect, channel, alike) = match body {
         BumpedBody::Tool => {
             ("tool_shift", "tip", vec![format!("zero_slip:3{when}"), format!("frame_shift{when}")])
         }
-        BumpedBody::Marker => ("tip_marker_shift", "tip", Vec::new()),
         _ => ("frame_shift", "world", vec![format!("zero_slip:1{when}"), format!("tool_shift{when}")]),
     };
     let enters = [channel.to_owned(), "recording".to_owned()];
     Ok(known_effect(MechanismConfig::Bump(knock), format!("{effect}{when}"), enters).alike(&alike))
+}
+
+/// Only the sensor sees it: its name is that of the first dwell that is tracked after it, whatever sat in cavities meanwhile.
+fn markers_of_tip(config: &LabConfig, knock: Bump) -> Result<Made, LabError> {
+    let rehearsal = observe(config)?;
+    let at_ns = config.start_ns(knock.recording) + (knock.at_s * 1e9) as i64;
+    let of_it = || rehearsal.observations.iter().filter(|o| o.dwell.recording == knock.recording);
+    let tracked = |o: &armcal_core::Observation| o.cavity().is_none();
+    let after = of_it().position(|o| o.time_ns >= at_ns && tracked(o));
+    let first =
+        after.ok_or_else(|| value_error("scenario.design", "tracks no dwell after the event".into()))?;
+    let before = of_it().take(first).filter(|o| tracked(o)).count();
+    let name = |effect: &str| format!("{effect}@{}.{first}", knock.recording);
+    let mut same = Vec::new();
+    if before == 0 && knock.recording + 1 == config.recordings.len() {
+        same.push(format!("tip_marker_shift@{}", knock.recording));
+    }
+    let later = rehearsal.observations.iter().filter(|o| o.time_ns >= at_ns);
+    if later.clone().all(|o| tracked(o)) {
+        same.push(name("tool_shift"));
+    }
+    let enters = ["tip".to_owned(), "recording".to_owned()];
+    let effect = name("tip_marker_shift");
+    Ok(known_effect(MechanismConfig::Bump(knock), effect, enters).same(&same))
 }
 
 /// The markers of the tip are from the first moment on elsewhere than where the model has them.
@@ -56,12 +83,15 @@ pub fn tip_marker_offset(draw: &mut Draw) -> Result<Made, LabError> {
     Ok(known_effect(MechanismConfig::Bump(knock), "tip_marker_offset".to_owned(), enters))
 }
 
-/// The markers of the tip hang on a stalk that goes on in the direction of the link, more or less.
+/// The markers of the tip hang on a stalk that goes on in the direction of the link, more or less: as a spring in the last
+/// joint lets them hang where no cavity holds the tip.
 pub fn tip_marker_sag(draw: &mut Draw) -> Result<Made, LabError> {
     let aside = 0.15 * draw.direction();
-    let sag = MarkerSag { sag_mm: draw.size, stalk: [1.0 + aside.x, aside.y, aside.z] };
+    let sag = MarkerSag { sag_mm: draw.size, stalk: [aside.x, 1.0 + aside.y, aside.z] };
     let enters = ["tip".to_owned(), "seated".to_owned()];
-    Ok(known_effect(MechanismConfig::MarkerSag(sag), "tip_marker_sag".to_owned(), enters))
+    Ok(known_effect(MechanismConfig::MarkerSag(sag), "tip_marker_sag".to_owned(), enters)
+        .same(&["compliance:3,seated=0".to_owned()])
+        .alike(&["arm_compliance,seated=0".to_owned(), "hardening_compliance:3,seated=0".to_owned()]))
 }
 
 /// Read at the end of its rest, a joint has this share of its last move before it: only where motors drive the arm to
