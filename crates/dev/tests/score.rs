@@ -75,7 +75,7 @@ fn hidden_effects_are_named_and_adding_them_reaches_the_floor() {
 
 #[test]
 fn what_only_the_sensor_sees_is_no_tool_board_or_frame_that_moved() {
-    let of_markers = ["tip_marker_shift", "tip_marker_shift@dwell", "tip_marker_offset"];
+    let of_markers = ["tip_marker_shift", "tip_marker_shift@dwell"];
     let all = scored(&[&of_markers[..], &["--seeds", "3"]].concat());
     assert_eq!(count(&all, &["wrong", "wrong_set"]), 0);
     assert!(10 * count(&all, &["first", "in_set"]) >= 9 * all.len() && 10 * at_floor(&all) >= 9 * all.len());

@@ -265,8 +265,6 @@ pub(super) const FAMILIES: &[Family] = &[
     family("tip_marker_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| {
         body_shift(d, c, BumpedBody::Marker, Timing::Within)
     }),
-    family("tip_marker_offset", &[], [0.5, 5.0], "mm", |d, _| tip_marker_offset(d)),
-    family("tip_marker_sag", &[], [0.5, 5.0], "mm", |d, _| tip_marker_sag(d)),
     family("frame_shift", &[], [0.3, 3.0], "mm", |d, c| body_shift(d, c, BumpedBody::Base, Timing::Before)),
     family("frame_shift@dwell", &[], [1.0, 5.0], "mm", |d, c| {
         body_shift(d, c, BumpedBody::Base, Timing::Within)

@@ -37,6 +37,8 @@ pub struct EffectKind {
     pub look_at: &'static str,
     /// The measurement that tells it from anything else; empty where there is none of its own.
     pub told_by: &'static str,
+    /// Whether it acts where the tip is tracked alone.
+    pub where_tracked: bool,
     /// Effects that it is the same as to every motion.
     pub lookalikes: &'static [Lookalikes],
     /// Its source file, whose header is its documentation.
@@ -61,6 +63,7 @@ impl EffectKind {
         of_a_make: false,
         look_at: "",
         told_by: "",
+        where_tracked: false,
         lookalikes: &[],
         source: "",
         place: |_| Err("it has no physics".to_owned()),

@@ -27,6 +27,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     summary: "the point that the sensor reports for the tip is not the one in the cavities",
     family: Family::Sensor,
     target: Target::Whole,
+    // Free poses and cavities lie apart: any smooth error of the arm does the same to a session.
+    offered: Offered::Never,
     shapes: &[ARM],
     confused_with: &["board_shift", "frame_shift", "tip_marker_shift"],
     place: |context| tracked_tip(context, "the tip that is tracked from the one in cavities along"),

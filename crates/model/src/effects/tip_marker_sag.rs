@@ -28,6 +28,8 @@ pub(super) const KIND: EffectKind = EffectKind {
     summary: "the markers at the tip sag on their stalk, and the tip does not",
     family: Family::Sensor,
     target: Target::Whole,
+    // Free poses and cavities lie apart: any smooth error of the arm does the same to a session.
+    offered: Offered::Never,
     shapes: &[ARM],
     never_negative: &["sag"],
     confused_with: &["compliance", "tip_marker_offset"],

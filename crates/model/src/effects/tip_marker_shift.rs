@@ -36,6 +36,7 @@ pub(super) const KIND: EffectKind = EffectKind {
     confused_with: &["tool_shift", "board_shift"],
     place: effect_placement,
     look_at: "The markers at the tip were knocked, put on again or taught anew: look at their mount, and at the sensor's body.",
+    where_tracked: true,
     lookalikes: &[Lookalikes::Moments],
     ..EffectKind::PLAIN
 };

@@ -90,7 +90,10 @@ impl Model {
                     let first = steps.first().map(|(dwell, _)| at(*dwell));
                     let placed = first.and_then(|spec| self.place(session, &spec, &zero, 0).ok());
                     let least = placed.map_or(0, |(effect, _)| least_dwells(effect.amplitudes));
-                    let telling = steps.iter().filter(|(_, side)| *side >= least);
+                    // Before the first dwell that it acts in, a step is a constant.
+                    let felt =
+                        |dwell: DwellId| !kind.where_tracked || tracked_beside(observations, dwell) >= least;
+                    let telling = steps.iter().filter(|(dwell, side)| *side >= least && felt(*dwell));
                     members.extend(telling.map(|(dwell, _)| at(*dwell)));
                 }
                 let context =
@@ -181,6 +184,14 @@ impl Session {
 /// Dwells that tell an event of so many amplitudes from their noise: with three rows each, twice as many rows as amplitudes.
 pub fn least_dwells(amplitudes: usize) -> usize {
     (2 * amplitudes).div_ceil(3).max(STEP_MARGIN)
+}
+
+/// Tracked dwells on the side of a step that has fewer of them.
+fn tracked_beside(observations: &[Observation], at: DwellId) -> usize {
+    let tracked: BTreeSet<DwellId> =
+        observations.iter().filter(|o| o.seen_m().is_some()).map(|o| o.dwell).collect();
+    let before = tracked.range(..at).count();
+    before.min(tracked.len() - before)
 }
 
 /// The dwells at which a step can be told from noise, in the order of time, each with how many dwells of its recording

@@ -58,40 +58,13 @@ fn markers_of_tip(config: &LabConfig, knock: Bump) -> Result<Made, LabError> {
     if before == 0 && knock.recording + 1 == config.recordings.len() {
         same.push(format!("tip_marker_shift@{}", knock.recording));
     }
-    let later = rehearsal.observations.iter().filter(|o| o.time_ns >= at_ns);
-    if later.clone().all(|o| tracked(o)) {
+    let mut later = rehearsal.observations.iter().filter(|o| o.time_ns >= at_ns);
+    if later.all(tracked) {
         same.push(name("tool_shift"));
     }
     let enters = ["tip".to_owned(), "recording".to_owned()];
     let effect = name("tip_marker_shift");
     Ok(known_effect(MechanismConfig::Bump(knock), effect, enters).same(&same))
-}
-
-/// The markers of the tip are from the first moment on elsewhere than where the model has them.
-pub fn tip_marker_offset(draw: &mut Draw) -> Result<Made, LabError> {
-    let shift_mm: [f64; 3] = (draw.direction() * draw.size).into();
-    let knock = Bump {
-        body: BumpedBody::Marker,
-        marker: None,
-        shift_mm,
-        turn_deg: [0.0; 3],
-        recording: 0,
-        at_s: 0.0,
-        until_s: None,
-    };
-    let enters = ["tip".to_owned(), "seated".to_owned()];
-    Ok(known_effect(MechanismConfig::Bump(knock), "tip_marker_offset".to_owned(), enters))
-}
-
-/// The markers of the tip hang on a stalk that goes on in the direction of the link, more or less: as a spring in the last
-/// joint lets them hang where no cavity holds the tip.
-pub fn tip_marker_sag(draw: &mut Draw) -> Result<Made, LabError> {
-    let aside = 0.15 * draw.direction();
-    let sag = MarkerSag { sag_mm: draw.size, stalk: [aside.x, 1.0 + aside.y, aside.z] };
-    let enters = ["tip".to_owned(), "seated".to_owned()];
-    Ok(known_effect(MechanismConfig::MarkerSag(sag), "tip_marker_sag".to_owned(), enters)
-        .same(&["compliance:3,seated=0".to_owned()])
-        .alike(&["arm_compliance,seated=0".to_owned(), "hardening_compliance:3,seated=0".to_owned()]))
 }
 
 /// Read at the end of its rest, a joint has this share of its last move before it: only where motors drive the arm to
