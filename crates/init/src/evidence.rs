@@ -203,9 +203,8 @@ pub fn in_turns(arm: &Arm, read: &AllRead, evidence: &[Evidence]) -> bool {
         Some((speed_ratio(&speeds, &body, likeness.delay_s), likeness.correlation))
     };
     let near = |ratio: f64, unit: f64| (ratio / unit).ln().abs() < SAME_SPEED.ln();
-    with(1.0).zip(with(TAU)).is_some_and(|((ratio, as_read), (in_turns, alike))| {
-        near(ratio, TAU) && near(in_turns, 1.0) && alike >= as_read
-    })
+    let Some((_, as_read)) = with(1.0).filter(|(ratio, _)| near(*ratio, TAU)) else { return false };
+    with(TAU).is_some_and(|(ratio, alike)| near(ratio, 1.0) && alike >= as_read)
 }
 
 /// A body moves at the speed of the arm within this factor, wherever on its end it is.

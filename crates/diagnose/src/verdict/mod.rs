@@ -30,7 +30,7 @@ use crate::weigh::Weighed;
 use crate::weigh::crossval::{by_place, errors_m, left_out};
 use crate::weigh::scatter::Scatter;
 use armcal_core::{Code, DwellId, Severity, Stage, Warning, list_names};
-use armcal_model::Toggle;
+use armcal_model::{Toggle, find};
 use nalgebra::DVector;
 use std::collections::BTreeSet;
 
@@ -374,7 +374,7 @@ fn seen_by_the_sensor_alone(a: &Accepted) -> bool {
     let dwells = &a.conditioned.problem.dwells;
     let shifted = SHIFTS.contains(&a.candidate.family.as_str());
     let during = temporary_since(&a.candidate.spec).filter(|_| shifted);
-    let of_markers = a.candidate.family == "tip_marker_shift";
+    let of_markers = find(&a.candidate.family).is_some_and(|kind| kind.where_tracked);
     during.is_some_and(|during| {
         of_markers
             || dwells.iter().filter(|d| during.holds(d.id)).flat_map(|d| &d.parts).all(|part| part.tracked)

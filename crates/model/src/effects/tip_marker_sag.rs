@@ -65,6 +65,6 @@ impl Physics for TipMarkerSag {
     }
 
     fn touched(&self, x: &Drivers<'_>, count: usize) -> Range<usize> {
-        if self.0.is_seen(x) { 0..count } else { 0..0 }
+        self.0.touched(x, count)
     }
 }

@@ -76,6 +76,11 @@ impl TrackedTip {
     pub fn is_seen(&self, x: &Drivers<'_>) -> bool {
         x.observation.feature.0 == self.arm && x.observation.seen_m().is_some()
     }
+
+    /// Of so many entries of what acts on it those that can matter to this observation.
+    pub fn touched(&self, x: &Drivers<'_>, count: usize) -> Range<usize> {
+        if self.is_seen(x) { 0..count } else { 0..0 }
+    }
 }
 
 #[derive(Debug)]
@@ -92,6 +97,6 @@ impl Physics for MovedWhereTracked {
     }
 
     fn touched(&self, x: &Drivers<'_>, count: usize) -> Range<usize> {
-        if self.tip.is_seen(x) { 0..count } else { 0..0 }
+        self.tip.touched(x, count)
     }
 }

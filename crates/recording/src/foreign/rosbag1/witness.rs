@@ -3,7 +3,7 @@
 
 use super::records::{Record, time_ns};
 use crate::foreign::copy::Copy;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Messages of a chunk, and its index: of each connection the times and places.
 pub(super) struct Indexed {
@@ -76,7 +76,7 @@ pub(super) struct Listed {
     listed: BTreeMap<u64, BTreeMap<u32, u32>>,
     seen: BTreeMap<u64, BTreeMap<u32, u32>>,
     /// Chunks that could not be read: already told.
-    unused: Vec<u64>,
+    unused: BTreeSet<u64>,
     broken: bool,
 }
 
@@ -88,7 +88,7 @@ impl Listed {
 
     pub fn chunk(&mut self, at: usize, seen: &Indexed) {
         if seen.unused {
-            self.unused.push(at as u64);
+            self.unused.insert(at as u64);
         }
         let counts = seen.seen.iter().map(|(connection, all)| (*connection, all.len() as u32)).collect();
         self.seen.insert(at as u64, counts);

@@ -1,6 +1,7 @@
 //! Tables of text: parted by commas, semicolons, tabs or blanks, with a header or without.
 
 use super::{Column, Table, Values};
+use std::collections::BTreeSet;
 
 /// Rows that are told by their numbers.
 const TOLD: usize = 5;
@@ -103,13 +104,14 @@ fn number(cell: &str, delimiter: u8) -> Option<f64> {
 
 /// Names, each once.
 fn unique(names: Vec<String>) -> Vec<String> {
-    let mut all: Vec<String> = Vec::with_capacity(names.len());
-    for (k, name) in names.into_iter().enumerate() {
+    let mut taken = BTreeSet::new();
+    let once = |(k, name): (usize, String)| {
         let name = if name.is_empty() { format!("column_{}", k + 1) } else { name };
-        let taken = all.contains(&name);
-        all.push(if taken { format!("{name}_{}", k + 1) } else { name });
-    }
-    all
+        let name = if taken.contains(&name) { format!("{name}_{}", k + 1) } else { name };
+        taken.insert(name.clone());
+        name
+    };
+    names.into_iter().enumerate().map(once).collect()
 }
 
 #[cfg(test)]
